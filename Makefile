@@ -1,0 +1,38 @@
+# make help lists the targets. Nothing needs to be installed first: see .ci/bootstrap.
+ready := .venv/.ready
+
+help: ## this list
+	@sed -n 's/^\([a-z-]*\):.*## /  \1\t/p' Makefile | expand -t 14
+
+demo: $(ready) ## grow a crack through a double cantilever beam; plots in out/dcb
+	.venv/bin/python demos/dcb.py --out out/dcb
+
+test: $(ready) ## quick tests: serial, on 2 and on 3 ranks
+	.ci/test quick
+
+test-slow: $(ready) ## the others: verification, convergence, hard cases
+	.ci/test slow
+
+test-all: test test-slow ## both
+
+lint: $(ready) ## style, format, types
+	.venv/bin/ruff check
+	.venv/bin/ruff format --check
+	.venv/bin/mypy
+
+bench: $(ready) ## the speed problems beside what a careful script does
+	mkdir -p out/bench
+	.venv/bin/fxcrack bench dcb2d --baseline --json out/bench/dcb2d.json
+	.venv/bin/fxcrack bench dcb3d --baseline --json out/bench/dcb3d.json
+
+clean: ## remove results and caches
+	rm -rf out build .mypy_cache .ruff_cache .pytest_cache
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+distclean: clean ## remove the environment too
+	rm -rf .venv fxcrack.egg-info
+
+$(ready): pyproject.toml .ci/bootstrap
+	.ci/bootstrap
+
+.PHONY: help demo test test-slow test-all lint bench clean distclean

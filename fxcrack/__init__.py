@@ -1,0 +1,66 @@
+"""fxcrack: crack propagation along predefined, initially bonded interfaces, on FEniCSx."""
+
+from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.abort import install as _install_abort
+from fxcrack.criteria import BK, VCCT, Power, Reeder
+from fxcrack.errors import FxcrackError, InputError
+from fxcrack.interface.pairing import Interface
+from fxcrack.loads import (
+    Amplitude,
+    BodyForce,
+    Displacement,
+    Monitor,
+    PointForce,
+    Pressure,
+    Ramp,
+    Traction,
+)
+from fxcrack.materials import Isotropic, Orthotropic
+from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
+from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.output.history import History
+from fxcrack.scene import Debond, Scene
+from fxcrack.solve.condensed import CondensedOptions
+from fxcrack.steps.static import Static
+from fxcrack.steps.until import CrackLength, Releases, Time
+
+__version__ = "0.1.0"
+
+_install_abort()
+
+__all__ = [
+    "BK",
+    "VCCT",
+    "Amplitude",
+    "Axisymmetric",
+    "BodyForce",
+    "CondensedOptions",
+    "CrackLength",
+    "Debond",
+    "Displacement",
+    "FxcrackError",
+    "History",
+    "InputError",
+    "Interface",
+    "Isotropic",
+    "Mesh",
+    "Monitor",
+    "Orthotropic",
+    "PlaneStrain",
+    "PlaneStress",
+    "PointForce",
+    "Power",
+    "Pressure",
+    "Ramp",
+    "Reeder",
+    "Releases",
+    "Scene",
+    "Solid",
+    "Split",
+    "Static",
+    "Time",
+    "Traction",
+    "compat",
+    "mesh_from_gmsh",
+    "read_mesh",
+]

@@ -1,0 +1,248 @@
+"""The linear elastic continuum: displacement space, stiffness, load vectors, stress.
+
+    K u = sum_i lambda_i(t) f_i,      K = int  strain(v)^T C strain(u)  w dV
+
+with the weight w of the kinematic model. No boundary condition is applied here: supports become
+columns of the coordinate transformation (:mod:`fxcrack.interface.jumps`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+import basix.ufl
+import dolfinx.fem.petsc
+import dolfinx.mesh
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from fxcrack.errors import InputError, agree
+from fxcrack.loads import BodyForce, Field, Load, Pressure, Traction
+from fxcrack.materials import Material
+from fxcrack.mesh import Mesh
+from fxcrack.models import Model
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int32]
+
+
+class Continuum:
+    """Elastic bodies on one mesh.
+
+    Args:
+        mesh: Mesh with named groups.
+        materials: One material, or a material per cell group covering every cell once.
+        model: Kinematic model.
+        order: Polynomial order of the displacement, 1 or 2; the order of the mesh by default.
+
+    Raises:
+        InputError: The model does not fit the mesh, or the materials do not cover it once.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        materials: Material | Mapping[str, Material],
+        model: Model,
+        *,
+        order: int | None = None,
+    ) -> None:
+        if model.gdim != mesh.gdim:
+            raise InputError(
+                f"{type(model).__name__} needs a mesh of dimension {model.gdim}, "
+                f"but mesh '{mesh.name}' has dimension {mesh.gdim}"
+            )
+        self.mesh = mesh
+        self.model = model
+        self.order = mesh.order if order is None else order
+        if self.order not in (1, 2):
+            raise InputError(f"order = {self.order}: only displacements of order 1 and 2 exist")
+        self.comm = mesh.comm
+        self.gdim = mesh.gdim
+        self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (self.gdim,)))
+        index_map = self.space.dofmap.index_map
+        self.n_local = int(index_map.size_local) * self.gdim
+        self.n_global = int(index_map.size_global) * self.gdim
+        self.offset = int(index_map.local_range[0]) * self.gdim
+        self._x = ufl.SpatialCoordinate(mesh.domain)
+        weight = model.weight(self._x)
+        self._weight = (
+            fem.Constant(mesh.domain, PETSc.ScalarType(weight))
+            if isinstance(weight, float)
+            else weight
+        )
+        self._degree = 2 * self.order + (1 if "Axisymmetric" in type(model).__name__ else 0)
+        self._parts = self._assign(materials)
+        self._form: Any = None
+
+    def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any]]:
+        """Pairs (stiffness constant, measure), one per material."""
+        domain, meta = self.mesh.domain, {"quadrature_degree": self._degree}
+        if not isinstance(materials, Mapping):
+            c = fem.Constant(domain, self.model.reduce(materials.stiffness()))
+            return [(c, ufl.dx(domain, metadata=meta))]
+        n_cells = domain.topology.index_map(self.mesh.tdim).size_local
+        count = np.zeros(n_cells, dtype=np.int32)
+        cells, values = [], []
+        for i, name in enumerate(materials):
+            group = self.mesh.group(name, dim=self.mesh.tdim).entities
+            cells.append(group)
+            values.append(np.full(len(group), i + 1, dtype=np.int32))
+            count[group[group < n_cells]] += 1
+        bad = None
+        if np.any(count != 1):
+            bad = (
+                f"materials cover {np.sum(count == 0)} cells of this rank not at all and "
+                f"{np.sum(count > 1)} more than once; name every cell group exactly once "
+                f"(given: {', '.join(materials)})"
+            )
+        agree(self.comm, bad)
+        entities, tags = np.concatenate(cells), np.concatenate(values)
+        sort = np.argsort(entities)
+        marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])
+        dx = ufl.Measure("dx", domain=domain, subdomain_data=marks, metadata=meta)
+        return [
+            (fem.Constant(domain, self.model.reduce(m.stiffness())), dx(i + 1))
+            for i, m in enumerate(materials.values())
+        ]
+
+    def compile(self) -> None:
+        """Compile the stiffness form (cached on disk by DOLFINx); assembly does it otherwise."""
+        if self._form is None:
+            u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+            eu, ev = self.model.strain(u, self._x), self.model.strain(v, self._x)
+            self._form = fem.form(
+                sum(ufl.inner(ufl.dot(c, eu), ev) * self._weight * dx for c, dx in self._parts)
+            )
+
+    def stiffness(self) -> PETSc.Mat:
+        """Assemble K, shape (n_global, n_global); the caller destroys it."""
+        self.compile()
+        matrix = dolfinx.fem.petsc.assemble_matrix(self._form)
+        matrix.assemble()
+        return matrix
+
+    def load_vector(self, load: Load) -> PETSc.Vec:
+        """Nodal forces of a load at amplitude 1; the caller destroys the vector."""
+        v = ufl.TestFunction(self.space)
+        meta = {"quadrature_degree": self._degree}
+        if isinstance(load, Traction):
+            ds = self._surface(load.where, meta)
+            form = ufl.inner(self._vector(load.value, load.title), v) * self._weight * ds
+        elif isinstance(load, Pressure):
+            ds = self._surface(load.where, meta)
+            normal = ufl.FacetNormal(self.mesh.domain)
+            form = -ufl.inner(self._field(load.value) * normal, v) * self._weight * ds
+        elif isinstance(load, BodyForce):
+            value = self._vector(load.value, load.title)
+            form = ufl.inner(value, v) * self._weight * self._volume(load.where, meta)
+        else:
+            return self._point_force(load.where, load.value, load.title)
+        vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return vector
+
+    def _surface(self, where: str, meta: dict[str, int]) -> Any:
+        facets = self.mesh.group(where, dim=self.mesh.tdim - 1).entities
+        marks = dolfinx.mesh.meshtags(
+            self.mesh.domain, self.mesh.tdim - 1, facets, np.ones(len(facets), dtype=np.int32)
+        )
+        return ufl.Measure("ds", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
+
+    def _volume(self, where: str | None, meta: dict[str, int]) -> Any:
+        if where is None:
+            return ufl.dx(self.mesh.domain, metadata=meta)
+        cells = self.mesh.group(where, dim=self.mesh.tdim).entities
+        marks = dolfinx.mesh.meshtags(
+            self.mesh.domain, self.mesh.tdim, cells, np.ones(len(cells), dtype=np.int32)
+        )
+        return ufl.Measure("dx", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
+
+    def _field(self, value: Field) -> Any:
+        if not callable(value):
+            return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
+        scalar = fem.functionspace(self.mesh.domain, ("Lagrange", self.order))
+        function = fem.Function(scalar)
+        function.interpolate(value)
+        return function
+
+    def _vector(self, value: tuple[Field, ...], title: str) -> Any:
+        if len(value) != self.gdim:
+            raise InputError(f"load '{title}': {len(value)} components given, {self.gdim} needed")
+        return ufl.as_vector([self._field(v) for v in value])
+
+    def _point_force(self, where: str, value: tuple[float, ...], title: str) -> PETSc.Vec:
+        if len(value) != self.gdim:
+            raise InputError(f"load '{title}': {len(value)} components given, {self.gdim} needed")
+        nodes = self.owned_nodes(where)
+        count = self.comm.allreduce(len(nodes))
+        vector = PETSc.Vec().createMPI((self.n_local, self.n_global), comm=self.comm)
+        for i, component in enumerate(value):
+            vector.array[self.gdim * nodes + i] = component / count
+        return vector
+
+    def owned_nodes(self, where: str) -> Ints:
+        """Displacement nodes of a group that this rank owns (local block indices); collective.
+
+        Raises:
+            InputError: No rank finds a node in the group.
+        """
+        group = self.mesh.group(where)
+        self.mesh.domain.topology.create_connectivity(group.dim, self.mesh.tdim)
+        nodes = fem.locate_dofs_topological(self.space, group.dim, group.entities)
+        nodes = np.unique(nodes[nodes < self.n_local // self.gdim])
+        if self.comm.allreduce(len(nodes)) == 0:
+            raise InputError(f"group '{where}' of mesh '{self.mesh.name}' holds no node")
+        return np.asarray(nodes, dtype=np.int32)
+
+    def positions(self) -> Array:
+        """Positions of the local displacement nodes, owned first, shape (n, 3), length."""
+        return np.asarray(self.space.tabulate_dof_coordinates())
+
+    def stress(self, u: fem.Function) -> fem.Function:
+        """Cell averages of the stress, components in the order of ``model.labels``."""
+        n = len(self.model.labels)
+        element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
+        space = fem.functionspace(self.mesh.domain, element)
+        trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
+        strain = self.model.strain(u, self._x)
+        volume = dolfinx.fem.petsc.assemble_vector(
+            fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self._weight * ufl.dx)
+        )
+        sigma = sum(
+            ufl.inner(ufl.dot(c, strain), test) * self._weight * dx for c, dx in self._parts
+        )
+        integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
+        del trial
+        out = fem.Function(space, name="stress")
+        local = len(volume.array)
+        out.x.array[:local] = integral.array / volume.array
+        out.x.scatter_forward()
+        volume.destroy()
+        integral.destroy()
+        return out
+
+    def von_mises(self, stress: fem.Function) -> fem.Function:
+        """Von Mises stress per cell; plane strain uses the in-plane components' exact s_zz."""
+        labels = self.model.labels
+        s = stress.x.array.reshape(-1, len(labels))
+        column = {name: s[:, i] for i, name in enumerate(labels)}
+        zero = np.zeros(len(s))
+        a = column.get("xx", column.get("rr", zero))
+        b = column.get("yy", column.get("zz", zero))
+        c = column.get("tt", column["zz"] if self.gdim == 3 else zero)
+        shears = [column[k] for k in ("xy", "rz", "yz", "xz") if k in column]
+        space = fem.functionspace(self.mesh.domain, ("DG", 0))
+        out = fem.Function(space, name="von_mises")
+        out.x.array[:] = np.sqrt(
+            0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) + 3.0 * sum(t**2 for t in shears)
+        )
+        return out
+
+
+__all__ = ["Continuum", "compat"]

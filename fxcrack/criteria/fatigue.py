@@ -1,0 +1,260 @@
+"""Fatigue growth by a Paris law of energy release rates (Paris and Erdogan 1963; ASTM D6115).
+
+With the total rate G at the extremes of a cycle, dG = G_max - G_min, and G_c of the mode-mix law:
+
+    onset    N0 = c1 dG^c2
+    growth   da/dN = c3 dG^c4           r1 G_c < G_max < r2 G_c
+             none                       G_max <= r1 G_c
+             the element in one cycle   G_max >= r2 G_c
+
+Between releases dG stays as it is, so the number of cycles to the next release is a closed form and
+one stabilised cycle is solved per release. At constant amplitude
+
+    N(a) = N0 + sum_i da_i/(c3 dG(a_i)^c4)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.criteria.checks import Array, Bools, not_negative, number, positive
+from fxcrack.criteria.mixed_mode import total
+from fxcrack.criteria.rate_criterion import RateCriterion
+from fxcrack.errors import InputError
+
+
+class Regime(IntEnum):
+    """Where the largest rate of the cycle lies between threshold and upper limit."""
+
+    NONE = 0
+    PARIS = 1
+    UNSTABLE = 2
+
+
+@dataclass(frozen=True)
+class Paris:
+    """Constants of onset and growth. Their units go with those of G: [G]^-c2 and length [G]^-c4.
+
+    Attributes:
+        c1: Factor of onset [cycles]; 0: growth starts at once.
+        c2: Exponent of onset, negative in practice.
+        c3: Factor of growth, positive [length per cycle].
+        c4: Exponent of growth, positive.
+        r1: Threshold over toughness.
+        r2: Upper limit of the Paris regime over toughness.
+    """
+
+    c1: float
+    c2: float
+    c3: float
+    c4: float
+    r1: float = 0.01
+    r2: float = 0.85
+
+    def __post_init__(self) -> None:
+        """Check the constants."""
+        not_negative("Paris", c1=self.c1, r1=self.r1)
+        positive("Paris", c3=self.c3, c4=self.c4, r2=self.r2)
+        if not np.isfinite(number("Paris", "c2", self.c2)):
+            raise InputError(f"Paris: c2 = {self.c2} must be finite")
+        if self.r1 >= self.r2:
+            raise InputError(
+                f"Paris: threshold r1 = {self.r1} must be below the upper limit r2 = {self.r2}"
+            )
+
+    def onset_cycles(self, dG: npt.ArrayLike) -> Array:
+        """Cycles N0 until growth starts, of the shape of ``dG`` [force/length]."""
+        return _times_power(self.c1, dG, self.c2)
+
+    def growth_rate(self, dG: npt.ArrayLike) -> Array:
+        """Growth da/dN in the Paris regime, of the shape of ``dG`` [length per cycle]."""
+        return _times_power(self.c3, dG, self.c4)
+
+    def regime(self, G_max: npt.ArrayLike, G_c: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Regime of each front node, values of :class:`Regime`.
+
+        Args:
+            G_max: Largest total rate of the cycle, shape (n,) [force/length].
+            G_c: Critical total rate, shape (n,) or one number [force/length].
+        """
+        top = np.asarray(G_max, dtype=np.float64)
+        critical = np.asarray(G_c, dtype=np.float64)
+        return np.where(
+            top >= self.r2 * critical,
+            int(Regime.UNSTABLE),
+            np.where(top > self.r1 * critical, int(Regime.PARIS), int(Regime.NONE)),
+        )
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fatigue(RateCriterion):
+    """Growth under cyclic load by a Paris law. Toughness, mode mix and method as for VCCT.
+
+    Attributes:
+        paris: Constants of onset and growth.
+        credit: Whether growth of front nodes that are not released is kept for later cycles; else
+            each of them starts its element anew.
+    """
+
+    paris: Paris
+    credit: bool = field(default=False)
+
+    def __post_init__(self) -> None:
+        """Check everything that does not need the interface."""
+        super().__post_init__()
+        if not isinstance(self.paris, Paris):
+            raise InputError(f"Fatigue: paris = {self.paris!r} must be a Paris(c1, c2, c3, c4)")
+
+    def cycle(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> tuple[Array, Array, Array]:
+        """What the laws need from one stabilised cycle.
+
+        Args:
+            rates: Energy release rates by mode at m instants of the cycle, its extremes among
+                them, shape (m, n, 3) [force/length].
+            toughness: Toughness by mode, shape (n, 3) or (3,) [force/length].
+
+        Returns:
+            dG, G_max and G_c at the mode mix of G_max, each of shape (n,) [force/length].
+        """
+        g = np.asarray(rates, dtype=np.float64)
+        totals = total(g)
+        worst = totals.argmax(axis=0)
+        at_worst = np.take_along_axis(g, worst[None, :, None], axis=0)[0]
+        top = totals.max(axis=0)
+        return top - totals.min(axis=0), top, self.critical(at_worst, toughness)
+
+
+@dataclass(frozen=True, eq=False)
+class CycleJump:
+    """What happens at the end of a stabilised cycle.
+
+    Attributes:
+        cycles: Cycles N so far, after the jump.
+        event: "growth" in the Paris regime; "unstable", at least one node beyond the upper limit;
+            "arrest", no node will ever be released; "limit", the allowed cycles are over.
+        release: Front nodes to release, shape (n,); none at "arrest" and "limit".
+        regime: Regime of each front node, shape (n,).
+        initiated: Front nodes at which onset is over, shape (n,).
+        credit: Growth of each front node within its element, shape (n,) [length]; 0 for those
+            released, None when no growth is kept.
+    """
+
+    cycles: float
+    event: Literal["growth", "unstable", "arrest", "limit"]
+    release: Bools
+    regime: npt.NDArray[np.int64]
+    initiated: Bools
+    credit: Array | None
+
+
+def cycle_jump(
+    paris: Paris,
+    dG: npt.ArrayLike,
+    G_max: npt.ArrayLike,
+    G_c: npt.ArrayLike,
+    da: npt.ArrayLike,
+    *,
+    cycles: float = 0.0,
+    initiated: npt.ArrayLike = False,
+    credit: npt.ArrayLike | None = None,
+    tolerance: float = 0.2,
+    limit: float = np.inf,
+) -> CycleJump:
+    """Jump over the cycles to the next release.
+
+    With N0 counted once, until onset, a node in the Paris regime goes after
+
+        dN = max(N0 - N, 0) + (da - credit)/(c3 dG^c4)
+
+    The jump is the smallest dN; nodes within ``tolerance`` of it go together. While a node is
+    beyond the upper limit the jump is one cycle: those nodes go, and others that finish within it.
+
+    Args:
+        paris: Constants of onset and growth.
+        dG: Range of the total rate over the cycle, shape (n,) [force/length].
+        G_max: Largest total rate of the cycle, shape (n,) [force/length].
+        G_c: Critical total rate, shape (n,) or one number [force/length].
+        da: Length by which releasing the node moves the front, shape (n,) or one number [length].
+        cycles: Cycles N so far.
+        initiated: Front nodes at which onset is over, shape (n,) or one truth value. Nodes that
+            come to the front by growth are.
+        credit: Growth so far within the element of each node, shape (n,) [length]; None when growth
+            of nodes that are not released is not kept.
+        tolerance: f_tol; nodes with dN <= (1 + f_tol) of the smallest are released together.
+        limit: Cycles at which the analysis ends.
+
+    Returns:
+        The jump.
+
+    Raises:
+        InputError: There is no front node, a rate is not finite or a length not positive.
+    """
+    dG, G_max, G_c, da = _front_arrays(dG, G_max, G_c, da)
+    n = len(dG)
+    onset_over = np.array(np.broadcast_to(np.asarray(initiated, dtype=np.bool_), (n,)))
+    grown = np.zeros(n) if credit is None else np.array(credit, dtype=np.float64)
+    regime = paris.regime(G_max, G_c)
+    rate = np.where(regime == Regime.PARIS, paris.growth_rate(dG), 0.0)
+    wait = np.where(onset_over, 0.0, np.maximum(paris.onset_cycles(dG) - cycles, 0.0))
+    left = np.maximum(da - grown, 0.0)
+    dN = wait + np.divide(left, rate, out=np.full(n, np.inf), where=rate > 0.0)
+
+    beyond = regime == Regime.UNSTABLE
+    event: Literal["growth", "unstable", "arrest", "limit"] = "growth"
+    if beyond.any():
+        event, jump = "unstable", 1.0
+        release = beyond | (dN <= jump)
+    else:
+        jump = float(dN.min())
+        release = np.isfinite(dN) & (dN <= (1.0 + tolerance) * jump)
+        if not release.any():
+            event, jump = "arrest", 0.0
+    if cycles + jump > limit:
+        event, jump, release = "limit", max(limit - cycles, 0.0), np.zeros(n, dtype=np.bool_)
+
+    if credit is not None:
+        moving = regime == Regime.PARIS
+        grown[moving] += rate[moving] * np.maximum(jump - wait[moving], 0.0)
+        grown[release] = 0.0
+    onset_over |= release | ((regime == Regime.PARIS) & (wait <= jump) & (event != "arrest"))
+    return CycleJump(
+        cycles=cycles + jump,
+        event=event,
+        release=release,
+        regime=regime,
+        initiated=onset_over,
+        credit=None if credit is None else grown,
+    )
+
+
+def _front_arrays(*given: npt.ArrayLike) -> list[Array]:
+    """The four arrays of a front at their common shape (n,), checked."""
+    arrays = [np.asarray(a, dtype=np.float64) for a in np.broadcast_arrays(*map(np.asarray, given))]
+    if arrays[0].ndim != 1 or arrays[0].size == 0:
+        raise InputError(
+            f"fatigue: the front has shape {arrays[0].shape}; give one value per front node, at "
+            "least one"
+        )
+    for name, values in zip(("dG", "G_max", "G_c", "da"), arrays, strict=True):
+        good = np.isfinite(values) & (values > 0.0 if name in ("G_c", "da") else values >= 0.0)
+        if not good.all():
+            row = int(np.flatnonzero(~good)[0])
+            raise InputError(
+                f"fatigue: {name} = {values[row]} at front node {row}; it must be finite and "
+                f"{'positive' if name in ('G_c', 'da') else 'not negative'}"
+            )
+    return arrays
+
+
+def _times_power(factor: float, base: npt.ArrayLike, exponent: float) -> Array:
+    """``factor * base**exponent`` in logarithms, so that no part of it overflows."""
+    b = np.asarray(base, dtype=np.float64)
+    if factor == 0.0 or exponent == 0.0:
+        return np.full(b.shape, float(factor))
+    with np.errstate(divide="ignore", over="ignore", under="ignore"):
+        return np.asarray(np.exp(np.log(factor) + exponent * np.log(b)))

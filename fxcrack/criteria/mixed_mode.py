@@ -1,0 +1,232 @@
+"""Mode-mix laws: how far a front node with rates (G_I, G_II, G_III) is from growth.
+
+The criterion is f = 1; G_c is the critical total rate at the present mode mix:
+
+    BK      G_c = G_Ic + (G_IIc - G_Ic) B^eta,                  B = (G_II + G_III)/G_T,  f = G_T/G_c
+    Reeder  G_c = G_Ic + (G_IIc - G_Ic) B^eta + (G_IIIc - G_IIc) G_III/(G_II + G_III) B^eta
+    power   f = (G_I/G_Ic)^am + (G_II/G_IIc)^an + (G_III/G_IIIc)^ao
+
+Negative rates count as zero. All laws depend on rates only through their ratios to the toughness,
+so any system of units will do.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.criteria.checks import Array, positive
+
+
+class MixedMode(Protocol):
+    """What every mode-mix law can do."""
+
+    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Value f of the criterion, shape (n,); growth at 1."""
+        ...
+
+    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Total rate at which growth starts at this mode mix, shape (n,)."""
+        ...
+
+
+def clip(rates: npt.ArrayLike) -> Array:
+    """Rates with the negative ones set to zero; NaN stays NaN.
+
+    Args:
+        rates: Energy release rates [force/length], any shape.
+    """
+    return np.maximum(np.asarray(rates, dtype=np.float64), 0.0)
+
+
+def total(rates: npt.ArrayLike) -> Array:
+    """Total rate G_T, the sum over the modes of the clipped rates, shape (n,) [force/length].
+
+    Args:
+        rates: Energy release rates by mode, shape (n, 3) [force/length].
+    """
+    return np.asarray(clip(rates).sum(axis=-1))
+
+
+@dataclass(frozen=True)
+class BK:
+    """Law of Benzeggagh and Kenane (1996); modes II and III share one toughness.
+
+    Attributes:
+        eta: Exponent, positive.
+    """
+
+    eta: float
+
+    def __post_init__(self) -> None:
+        """Check the exponent."""
+        positive("BK", eta=self.eta)
+
+    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Critical total rate at the present mode mix; G_Ic where all rates are zero.
+
+        Args:
+            rates: Energy release rates by mode, shape (n, 3) [force/length].
+            toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) or (3,) [force/length].
+
+        Returns:
+            Critical rates, shape (n,) [force/length].
+        """
+        shear, _ = _shares(rates)
+        g1, g2, _ = _by_mode(toughness)
+        return np.asarray(g1 + (g2 - g1) * shear**self.eta)
+
+    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Value f = G_T/G_c of the criterion; arguments as for :meth:`critical`.
+
+        Returns:
+            Values, shape (n,); 0 where all rates are zero.
+        """
+        return total(rates) / self.critical(rates, toughness)
+
+
+@dataclass(frozen=True)
+class Reeder:
+    """Law of Reeder et al. (2002): BK with a mode III toughness of its own.
+
+    Attributes:
+        eta: Exponent, positive.
+    """
+
+    eta: float
+
+    def __post_init__(self) -> None:
+        """Check the exponent."""
+        positive("Reeder", eta=self.eta)
+
+    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Critical total rate at the present mode mix; G_Ic where all rates are zero.
+
+        Args:
+            rates: Energy release rates by mode, shape (n, 3) [force/length].
+            toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) or (3,) [force/length].
+
+        Returns:
+            Critical rates, shape (n,) [force/length].
+        """
+        shear, tear = _shares(rates)
+        g1, g2, g3 = _by_mode(toughness)
+        return np.asarray(g1 + (g2 - g1 + (g3 - g2) * tear) * shear**self.eta)
+
+    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Value f = G_T/G_c of the criterion; arguments as for :meth:`critical`.
+
+        Returns:
+            Values, shape (n,); 0 where all rates are zero.
+        """
+        return total(rates) / self.critical(rates, toughness)
+
+
+@dataclass(frozen=True)
+class Power:
+    """Power law of Wu and Reuter (1965).
+
+    Attributes:
+        am: Exponent of mode I, positive.
+        an: Exponent of mode II, positive.
+        ao: Exponent of mode III, positive; that of mode II when not given.
+    """
+
+    am: float
+    an: float
+    ao: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the exponents."""
+        positive("Power", am=self.am, an=self.an)
+        if self.ao is not None:
+            positive("Power", ao=self.ao)
+
+    @property
+    def exponents(self) -> Array:
+        """The three exponents, shape (3,)."""
+        return np.array([self.am, self.an, self.an if self.ao is None else self.ao])
+
+    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Value f of the criterion, the sum of the powers.
+
+        Args:
+            rates: Energy release rates by mode, shape (n, 3) [force/length].
+            toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) or (3,) [force/length].
+
+        Returns:
+            Values, shape (n,); 0 where all rates are zero.
+        """
+        relative = clip(rates) / np.asarray(toughness, dtype=np.float64)
+        with np.errstate(over="ignore"):  # infinite f: far beyond growth
+            return np.asarray((relative**self.exponents).sum(axis=-1))
+
+    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Critical total rate at the present mode mix; G_Ic where all rates are zero.
+
+        It is lambda G_T, where rates scaled by lambda give f = 1. So it depends on the mix alone,
+        as for the other laws; G_T/f, the same at f = 1, would depend on the load away from it.
+
+        Args:
+            rates: Energy release rates by mode, shape (n, 3) [force/length].
+            toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) or (3,) [force/length].
+
+        Returns:
+            Critical rates, shape (n,) [force/length].
+        """
+        shares = _normalised(rates)
+        tough = np.broadcast_to(np.asarray(toughness, dtype=np.float64), shares.shape)
+        some = ~(shares.max(axis=-1) == 0.0)  # a NaN counts as some, and stays
+        relative = np.where(some[..., None], shares / tough, np.array([1.0, 0.0, 0.0]))
+        scale = np.exp(_log_scale_to_one(relative, self.exponents))
+        return np.where(some, scale * shares.sum(axis=-1), tough[..., 0])
+
+
+def _log_scale_to_one(x: Array, exponents: Array) -> Array:
+    """Root t of sum_i (e^t x_i)^a_i = 1 for each row of ``x``, which has a positive entry.
+
+    Newton on log sum_i exp(a_i (t + log x_i)), which is convex and increasing in t: from the second
+    iterate on it descends to the root, without safeguards.
+    """
+    with np.errstate(divide="ignore"):
+        logs = np.log(x)  # -inf drops out of the sum
+    t = -logs.max(axis=-1)
+    for _ in range(50):  # about six are needed; more only for exponents far apart
+        terms = exponents * (t[..., None] + logs)
+        top = terms.max(axis=-1, keepdims=True)
+        weights = np.exp(terms - top)
+        value = top[..., 0] + np.log(weights.sum(axis=-1))
+        slope = (weights * exponents).sum(axis=-1) / weights.sum(axis=-1)
+        step = value / slope
+        t = t - step
+        if not np.any(np.abs(step) > 1e-14 * np.maximum(np.abs(t), 1.0)):
+            break
+    return np.asarray(t)
+
+
+def _normalised(rates: npt.ArrayLike) -> Array:
+    """Clipped rates divided by the largest of their row; zeros stay."""
+    g = clip(rates)
+    top = g.max(axis=-1, keepdims=True)
+    return np.divide(g, top, out=g.copy(), where=top > 0.0)
+
+
+def _shares(rates: npt.ArrayLike) -> tuple[Array, Array]:
+    """(G_II + G_III)/G_T and G_III/(G_II + G_III), each 0 where it would be 0/0."""
+    g = _normalised(rates)
+    shear = g[..., 1] + g[..., 2]
+    whole = g[..., 0] + shear
+    zero = np.zeros_like(shear)
+    return (
+        np.divide(shear, whole, out=zero.copy(), where=whole > 0.0),
+        np.divide(g[..., 2], shear, out=zero.copy(), where=shear > 0.0),
+    )
+
+
+def _by_mode(toughness: npt.ArrayLike) -> tuple[Array, Array, Array]:
+    """Columns of the toughness."""
+    g = np.asarray(toughness, dtype=np.float64)
+    return g[..., 0], g[..., 1], g[..., 2]

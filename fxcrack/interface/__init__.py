@@ -1,0 +1,1 @@
+"""interface layer of fxcrack; see the modules."""

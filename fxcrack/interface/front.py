@@ -1,0 +1,360 @@
+"""Crack tips and fronts on a slave surface: where, which way, how far to the neighbours.
+
+A front node is a bonded slave node with an open neighbour along an edge. Its growth direction s is
+minus the gradient of the open/bonded indicator over the facets around it, so it needs no
+structured mesh; with the normal n and the front tangent t = n x s it forms the local frame.
+The wake point lies where the ray -s leaves the facets around the node; openings are
+interpolated there. Second-order surfaces use the corner-midside-corner lines of their facets.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.errors import InterfaceError
+from fxcrack.interface.surface import FacetSurface
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+_EDGES = {
+    "interval": ((0, 1),),
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quadrilateral": ((0, 1), (1, 3), (3, 2), (2, 0)),
+}
+# lines corner-midside-corner (and midside-centre-midside) of second-order facets, basix order
+_LINES = {
+    "interval": ((0, 2, 1),),
+    "quadrilateral": ((0, 4, 1), (2, 7, 3), (0, 5, 2), (1, 6, 3), (5, 8, 6), (4, 8, 7)),
+}
+
+
+@dataclass(frozen=True)
+class Tip:
+    """One front node and what surrounds it.
+
+    Attributes:
+        node: Slave node.
+        force_nodes: Nodes whose bond forces count, and that are released together, shape (k,).
+        wake_nodes: Two nodes per wake point, shape (k, 2).
+        wake_weights: Their weights, shape (k, 2).
+        frame: Columns n, s (growth direction), t (front tangent), shape (3, 3).
+        d_ahead: Distance to the next node along s, 0 at the end of the surface, length.
+        d_behind: Distance to the wake point, length.
+        width: Front length (times thickness or ring) the node stands for, length.
+        area: Area that opens when the node is released, length^2.
+    """
+
+    node: int
+    force_nodes: Ints
+    wake_nodes: Ints
+    wake_weights: Array
+    frame: Array
+    d_ahead: float
+    d_behind: float
+    width: float
+    area: float
+
+
+@dataclass(frozen=True)
+class Tips:
+    """Several tips as arrays, first axis n_tips; fields as in :class:`Tip`."""
+
+    node: Ints
+    force_nodes: Ints
+    wake_nodes: Ints
+    wake_weights: Array
+    frame: Array
+    d_ahead: Array
+    d_behind: Array
+    width: Array
+    area: Array
+
+    def __len__(self) -> int:
+        """Number of tips."""
+        return len(self.node)
+
+
+class Front:
+    """Finds the front nodes of a partly bonded surface and keeps their geometry up to date.
+
+    Args:
+        surface: Slave surface.
+        bonded: Initially bonded nodes, shape (n_nodes,).
+        title: Name of the interface in messages.
+
+    Raises:
+        InterfaceError: A second-order tip starts at a midside node, or the facets are
+            second-order triangles.
+    """
+
+    def __init__(self, surface: FacetSurface, bonded: Bools, title: str) -> None:
+        self.surface = surface
+        self.title = title
+        self.bonded = bonded.copy()
+        self.version = 0
+        self._cache: dict[int, Tip | None] = {}
+        facets = surface.facets
+        flat = np.argsort(facets.ravel(), kind="stable")
+        counts = np.bincount(facets.ravel(), minlength=surface.n_nodes)
+        self._facets_of = np.split(flat // facets.shape[1], np.cumsum(counts)[:-1])
+        if surface.order == 2 and surface.kind not in _LINES:
+            raise InterfaceError(
+                f"interface '{title}' has second-order triangular faces: no crack-closure unit "
+                "is defined on them; use first-order tetrahedra or second-order hexahedra"
+            )
+        pattern = _EDGES[surface.kind] if surface.order == 1 else _LINES[surface.kind]
+        ends = np.concatenate([facets[:, [e[0], e[-1]]] for e in pattern])
+        middle = (
+            np.concatenate([facets[:, e[1]] for e in pattern])
+            if surface.order == 2
+            else np.full(len(ends), -1)
+        )
+        links = np.unique(np.column_stack([np.sort(ends, axis=1), middle]), axis=0)
+        both = np.concatenate([links, links[:, [1, 0, 2]]])
+        both = both[np.lexsort((both[:, 1], both[:, 0]))]
+        split = np.searchsorted(both[:, 0], np.arange(1, surface.n_nodes))
+        self._links = np.split(both[:, 1:], split)
+        self._is_middle = np.zeros(surface.n_nodes, dtype=bool)
+        if surface.order == 2:
+            self._check_middles(facets)
+        self._heading = self._initial_heading() if self._by_lines else None
+
+    @property
+    def _by_lines(self) -> bool:
+        return self.surface.order == 2
+
+    def _check_middles(self, facets: Ints) -> None:
+        """In 2-D the unbonded part must cover whole element faces."""
+        if self.surface.dim == 1:
+            self._is_middle[facets[:, 2]] = True
+            ends = self.bonded[facets[:, :2]].sum(axis=1)
+            wrong = self.bonded[facets[:, 2]] & (ends == 0) | ~self.bonded[facets[:, 2]] & (
+                ends == 2
+            )
+            if np.any(wrong):
+                where = self.surface.x[facets[np.argmax(wrong), 2]]
+                raise InterfaceError(
+                    f"interface '{self.title}': the tip at {where} is a midside node; on "
+                    "second-order faces the open part must cover whole element faces, "
+                    "let the bonded set begin at a corner node"
+                )
+            # a midside node belongs to the bonded part only if both its corners do
+            loose = self.bonded[facets[:, 2]] & (ends < 2)
+            self.bonded[facets[loose, 2]] = False
+
+    def _initial_heading(self) -> Array:
+        """Growth direction of the nearest initial front facet, per node, shape (n_nodes, 3)."""
+        s = self.surface
+        indicator = (~self.bonded).astype(float)
+        corner = s.facets[:, : s.n_corners]
+        mixed = (indicator[corner].sum(axis=1) > 0) & (indicator[corner].sum(axis=1) < s.n_corners)
+        if not mixed.any():
+            return np.zeros((s.n_nodes, 3))
+        direction = np.array([-self._gradient(int(f), indicator)[0] for f in np.flatnonzero(mixed)])
+        direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
+        centre = s.x[corner[mixed]].mean(axis=1)
+        distance = np.linalg.norm(s.x[:, None] - centre[None], axis=2)
+        return np.asarray(direction[np.argmin(distance, axis=1)])
+
+    def release(self, nodes: Ints) -> None:
+        """Open nodes and forget the geometry around them."""
+        self.bonded[nodes] = False
+        self.version += 1
+        for node in nodes:
+            for facet in self._facets_of[node]:
+                for other in self.surface.facets[facet]:
+                    for second in self._facets_of[other]:
+                        for third in self.surface.facets[second]:
+                            self._cache.pop(int(third), None)
+
+    def neighbours(self, node: int) -> Ints:
+        """Nodes linked to a node along an edge."""
+        return np.asarray(self._links[node][:, 0])
+
+    def candidates(self) -> Ints:
+        """Front nodes, ascending."""
+        bonded = np.flatnonzero(self.bonded & ~self._is_middle)
+        if not hasattr(self, "_near"):
+            self._near = self._pad_links()
+        ends, middles = self._near
+        far = ends[bonded]
+        is_open = (far >= 0) & ~self.bonded[far]
+        if self._by_lines:
+            middle = middles[bonded]
+            is_open &= ~self.bonded[middle]
+            if self.surface.dim == 2 and self._heading is not None:
+                back = self.surface.x[bonded][:, None] - self.surface.x[far]
+                length = np.linalg.norm(back, axis=2)
+                along = np.einsum("nkc,nc->nk", back, self._heading[bonded])
+                is_open &= along > 0.7 * length
+        return bonded[is_open.any(axis=1)]
+
+    def _pad_links(self) -> tuple[Ints, Ints]:
+        width = max(len(link) for link in self._links)
+        ends = np.full((self.surface.n_nodes, width), -1, dtype=np.int64)
+        middles = np.full((self.surface.n_nodes, width), -1, dtype=np.int64)
+        for i, link in enumerate(self._links):
+            ends[i, : len(link)], middles[i, : len(link)] = link[:, 0], link[:, 1]
+        return ends, middles
+
+    def tips(self) -> Tips:
+        """All front nodes with their geometry."""
+        found = [self.tip(int(i)) for i in self.candidates()]
+        k = 2 if self._by_lines else 1
+        if not found:
+            e, z = np.zeros(0, dtype=np.int64), np.zeros(0)
+            return Tips(e, e.reshape(0, k), np.zeros((0, k, 2), dtype=np.int64),
+                        np.zeros((0, k, 2)), np.zeros((0, 3, 3)), z, z, z, z)  # fmt: skip
+        return Tips(
+            np.array([t.node for t in found]),
+            np.array([t.force_nodes for t in found]),
+            np.array([t.wake_nodes for t in found]),
+            np.array([t.wake_weights for t in found]),
+            np.array([t.frame for t in found]),
+            np.array([t.d_ahead for t in found]),
+            np.array([t.d_behind for t in found]),
+            np.array([t.width for t in found]),
+            np.array([t.area for t in found]),
+        )
+
+    def tip(self, node: int) -> Tip:
+        """Geometry of one front node."""
+        found = self._cache.get(node)
+        if found is None:
+            found = self._tip_on_lines(node) if self._by_lines else self._tip(node)
+            self._cache[node] = found
+        return found
+
+    def _gradient(self, facet: int, indicator: Array) -> tuple[Array, float]:
+        """Gradient of a nodal indicator at a facet's centre, and the facet's size."""
+        s = self.surface
+        corner = s.facets[facet, : s.n_corners]
+        x, v = s.x[corner], indicator[corner]
+        if s.kind == "interval":
+            a, b = (x[1] - x[0])[None], np.array([v[1] - v[0]])
+        elif s.kind == "triangle":
+            a, b = np.stack([x[1] - x[0], x[2] - x[0]]), np.array([v[1] - v[0], v[2] - v[0]])
+        else:
+            a = 0.5 * np.stack([x[1] + x[3] - x[0] - x[2], x[2] + x[3] - x[0] - x[1]])
+            b = 0.5 * np.array([v[1] + v[3] - v[0] - v[2], v[2] + v[3] - v[0] - v[1]])
+        metric = a @ a.T
+        size = float(np.sqrt(np.linalg.det(metric)))
+        return np.asarray(np.linalg.solve(metric, b) @ a), size
+
+    def _growth(self, node: int) -> Array:
+        """Unit growth direction in the tangent plane."""
+        s = self.surface
+        indicator = (~self.bonded).astype(float)
+        total = np.zeros(3)
+        scale = 0.0
+        for facet in self._facets_of[node]:
+            gradient, size = self._gradient(int(facet), indicator)
+            total -= size * gradient
+            scale += size * float(np.linalg.norm(gradient))
+        normal = s.normals[node]
+        total -= (total @ normal) * normal
+        length = float(np.linalg.norm(total))
+        if length < 1e-6 * max(scale, 1e-300):
+            # open on all sides: grow away from the first open neighbour
+            behind = [k for k in self.neighbours(node) if not self.bonded[k]][0]
+            total = s.x[node] - s.x[behind]
+            total -= (total @ normal) * normal
+            length = float(np.linalg.norm(total))
+        return np.asarray(total / length)
+
+    def _frame(self, node: int, growth: Array) -> Array:
+        normal = -self.surface.normals[node]
+        return np.stack([normal, growth, np.cross(normal, growth)], axis=1)
+
+    def _tip(self, node: int) -> Tip:
+        s = self.surface
+        growth = self._growth(node)
+        d_behind, wake, weights = self._ray(node, -growth, open_side=True)
+        d_ahead, _, _ = self._ray(node, growth, open_side=False)
+        if s.dim == 1:
+            width = float(s.breadth[node])
+        else:
+            width = float(s.areas[node]) / (0.5 * (d_ahead + d_behind))
+        area = width * d_ahead if d_ahead > 0.0 else float(s.areas[node])
+        return Tip(
+            node, np.array([node]), wake[None], weights[None], self._frame(node, growth),
+            d_ahead, d_behind, width, area,
+        )  # fmt: skip
+
+    def _ray(self, node: int, direction: Array, *, open_side: bool) -> tuple[float, Ints, Array]:
+        """Where a ray leaves the facets around a node: distance, two nodes, their weights."""
+        s = self.surface
+        origin = s.x[node]
+        best: tuple[float, Ints, Array] | None = None
+        if s.dim == 2:
+            side = np.cross(s.normals[node], direction)
+            for facet in self._facets_of[node]:
+                corner = s.facets[facet, : s.n_corners]
+                for a, b in _EDGES[s.kind]:
+                    i, j = corner[a], corner[b]
+                    if node in (i, j):
+                        continue
+                    pi, pj = s.x[i] - origin, s.x[j] - origin
+                    ci, cj = float(pi @ side), float(pj @ side)
+                    if abs(ci - cj) < 1e-300:
+                        continue
+                    w = ci / (ci - cj)
+                    if not -1e-6 <= w <= 1.0 + 1e-6:
+                        continue
+                    w = 0.0 if abs(w) < 1e-6 else 1.0 if abs(w - 1.0) < 1e-6 else w
+                    distance = float(((1.0 - w) * pi + w * pj) @ direction)
+                    if distance > 0.0 and (best is None or distance < best[0] * (1.0 - 1e-9)):
+                        best = distance, np.array([i, j]), np.array([1.0 - w, w])
+            if best is not None:
+                return best
+        # along a line, or where the ray leaves the surface at once: the best aligned neighbour
+        near = [k for k in self.neighbours(node) if not open_side or not self.bonded[k]]
+        vectors = s.x[near] - origin if near else np.zeros((0, 3))
+        length = np.linalg.norm(vectors, axis=1)
+        cosine = vectors @ direction / np.where(length > 0.0, length, 1.0)
+        if not near or cosine.max() < 0.3:
+            if open_side:
+                k = int(np.argmin(length))
+                return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
+            return 0.0, np.array([node, node]), np.array([1.0, 0.0])
+        k = int(np.argmax(cosine))
+        return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
+
+    def _tip_on_lines(self, node: int) -> Tip:
+        s = self.surface
+        heading = self._heading[node] if self._heading is not None else np.zeros(3)
+        links = self._links[node]
+        vectors = s.x[links[:, 0]] - s.x[node]
+        length = np.linalg.norm(vectors, axis=1)
+        is_open = ~self.bonded[links[:, 0]] & ~self.bonded[links[:, 1]]
+        if s.dim == 1:
+            behind = int(np.argmax(is_open))
+        else:
+            behind = int(np.argmax(np.where(is_open, -(vectors @ heading) / length, -2.0)))
+        growth = -vectors[behind] / length[behind]
+        normal = s.normals[node]
+        growth = growth - (growth @ normal) * normal
+        growth /= np.linalg.norm(growth)
+        cosine = vectors @ growth / length
+        ahead = int(np.argmax(cosine))
+        corner, middle = links[behind]
+        if cosine[ahead] < 0.3 or ahead == behind:
+            force_nodes, d_ahead = np.array([node, node]), 0.0
+        else:
+            force_nodes, d_ahead = np.array([node, links[ahead, 1]]), float(length[ahead])
+        d_behind = float(length[behind])
+        if s.dim == 1:
+            width = float(s.breadth[node])
+        else:
+            width = float(s.areas[middle]) / (d_behind * 2.0 / 3.0)
+            # a midside node between two facets collects both; a line has one facet on each side
+        return Tip(
+            node, force_nodes, np.array([[corner, corner], [middle, middle]]),
+            np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth), d_ahead, d_behind,
+            width, width * (d_ahead if d_ahead > 0.0 else 0.5 * d_behind),
+        )  # fmt: skip

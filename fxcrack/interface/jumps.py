@@ -1,0 +1,470 @@
+"""Jump coordinates: the transformation u = T q of design.md, section 2.
+
+Columns of T, in this order on each rank:
+
+* inner coordinates: free displacements, and jumps outside the window that are free;
+* on rank 0 only, last: window jumps, one column per prescribed displacement component
+  (u = d times its shape), and empty columns kept for the borders of force patterns and monitors.
+
+A bonded jump outside the window has no column: it is zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+from scipy.sparse.csgraph import connected_components
+
+from fxcrack.continuum import Continuum
+from fxcrack.errors import InputError, InterfaceError, agree
+from fxcrack.interface.pairing import Pair
+from fxcrack.loads import Displacement
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+HELD, INNER, WINDOW = 0, 1, 2
+"""Roles of a jump component: zero for good, free in the continuum, or part of the window."""
+
+
+@dataclass(frozen=True)
+class SupportColumn:
+    """One prescribed component: displacement = amplitude times ``shape`` on some dofs.
+
+    Attributes:
+        title: Name in the history, e.g. "pin_top.y".
+        support: The support it belongs to.
+        moves: Whether any prescribed value differs from zero.
+        scale: Prescribed displacement at amplitude 1 where it is the same on all dofs; the column
+            then holds ones, its coordinate is a displacement and its conjugate the reaction.
+            1 where it varies: the coordinate is the amplitude.
+    """
+
+    title: str
+    support: Displacement
+    moves: bool
+    scale: float
+
+    def coordinate(self, time: float) -> float:
+        """Value of the column's coordinate at a time."""
+        return self.scale * self.support.amplitude(time) if self.moves else 0.0
+
+
+@dataclass(frozen=True)
+class Supports:
+    """Prescribed displacement components of a scene.
+
+    Attributes:
+        columns: One per component.
+        which: Column number per owned dof, -1 where free, shape (n_local,).
+        value: Entry of that column per owned dof, shape (n_local,).
+    """
+
+    columns: tuple[SupportColumn, ...]
+    which: Ints
+    value: Array
+
+
+def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supports:
+    """Number the prescribed components and place them on the dofs; collective.
+
+    Raises:
+        InputError: Two supports prescribe different values for one dof, or a value is not finite.
+    """
+    gdim = continuum.gdim
+    which = np.full(continuum.n_local, -1, dtype=np.int64)
+    value = np.zeros(continuum.n_local)
+    columns: list[SupportColumn] = []
+    problem = None
+    x = continuum.positions()
+    for support in supports:
+        nodes = continuum.owned_nodes(support.where)
+        for axis, field in zip("xyz", (support.x, support.y, support.z), strict=True):
+            if field is None:
+                continue
+            component = "xyz".index(axis)
+            if component >= gdim:
+                raise InputError(
+                    f"Displacement('{support.title}') prescribes {axis} in {gdim} dimensions"
+                )
+            dofs = gdim * nodes.astype(np.int64) + component
+            values = np.broadcast_to(
+                np.asarray(field(x[nodes].T) if callable(field) else field, dtype=float),
+                (len(nodes),),
+            )
+            if not np.all(np.isfinite(values)):
+                problem = f"Displacement('{support.title}'): {axis} is not a finite number"
+            taken = which[dofs] >= 0
+            if np.any(taken & (value[dofs] != values)):
+                other = columns[which[dofs[taken & (value[dofs] != values)][0]]].title
+                problem = (
+                    f"supports '{support.title}.{axis}' and '{other}' prescribe different values "
+                    f"at {x[nodes[np.argmax(taken)]]}; let only one of them hold that node"
+                )
+            free = ~taken
+            which[dofs[free]], value[dofs[free]] = len(columns), values[free]
+            low = continuum.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
+            high = continuum.comm.allreduce(float(values.max(initial=-np.inf)), op=MPI.MAX)
+            moves = low != 0.0 or high != 0.0
+            scale = high if moves and low == high else 1.0
+            columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale))
+    agree(continuum.comm, problem)
+    for i, column in enumerate(columns):
+        # a component that stays zero keeps a column of ones, which gives its reaction
+        value[which == i] = 1.0 if not column.moves else value[which == i] / column.scale
+    return Supports(tuple(columns), which, value)
+
+
+@dataclass
+class JumpCoordinates:
+    """The transformation T and the numbering of its columns.
+
+    Attributes:
+        transform: T, PETSc AIJ, shape (n_global, n_coordinates).
+        frames: Frame of each slave node per pair, aligned with supports, (n_nodes, gdim, gdim).
+        held: Jump components that supports hold at zero, per pair, shape (n_nodes, gdim).
+        index: Window number of each jump component per pair, -1 outside, shape (n_nodes, gdim).
+        n_window: Number of window components.
+        n_supports: Number of support columns, which follow the window.
+        n_borders: Number of empty columns, which come last.
+        n_inner: Inner coordinates of this rank.
+        first: Global number of the first window column.
+    """
+
+    transform: PETSc.Mat
+    frames: list[Array]
+    held: list[npt.NDArray[np.bool_]]
+    index: list[Ints]
+    n_window: int
+    n_supports: int
+    n_borders: int
+    n_inner: int
+    first: int
+
+    @property
+    def n_last(self) -> int:
+        """Window, support and border columns together."""
+        return self.n_window + self.n_supports + self.n_borders
+
+
+def align_frames(
+    pairs: list[Pair], which: list[Ints], value: list[Array], supports: Supports, gdim: int
+) -> tuple[list[Array], list[npt.NDArray[np.bool_]]]:
+    """Turn the frames of slave nodes that supports hold, and mark the jumps held with them.
+
+    Args:
+        pairs: Interfaces.
+        which: Per pair, support column of each (slave node, component), -1 if free.
+        value: Per pair, prescribed value likewise.
+        supports: For the titles in messages.
+        gdim: Dimension.
+
+    Returns:
+        Frames and held components per pair.
+
+    Raises:
+        InterfaceError: A held direction is oblique to the interface.
+    """
+    del value
+    frames, held = [], []
+    for pair, columns in zip(pairs, which, strict=True):
+        frame = pair.frames.copy()
+        hold = np.zeros((pair.surface.n_nodes, gdim), dtype=bool)
+        for node in np.flatnonzero((columns >= 0).any(axis=1) & pair.paired):
+            axes = [np.eye(gdim)[c] for c in np.flatnonzero(columns[node] >= 0)]
+            if len(axes) == gdim:
+                hold[node] = True
+                continue
+            normal = frame[node, :, 0]
+            for axis in axes:
+                along = abs(float(axis @ normal))
+                if along > 1.0 - 1e-8:
+                    hold[node, 0] = True
+                elif along < 1e-8:
+                    if gdim == 3 and not hold[node, 1:].any():
+                        frame[node] = np.stack([normal, np.cross(axis, normal), axis], axis=1)
+                        hold[node, 2] = True
+                    else:
+                        hold[node, 1] = True
+                else:
+                    title = supports.columns[columns[node].max()].title
+                    raise InterfaceError(
+                        f"support '{title}' holds slave node {node} of interface '{pair.title}' "
+                        f"at {pair.surface.x[node]} in a direction oblique to the interface; "
+                        "hold it along the interface or across it, or end the support before it"
+                    )
+        frames.append(frame)
+        held.append(hold)
+    return frames, held
+
+
+class _Replica:
+    """What every rank knows of the displacement nodes that take part in an interface."""
+
+    def __init__(self, continuum: Continuum, pairs: list[Pair], supports: Supports) -> None:
+        gdim, comm = continuum.gdim, continuum.comm
+        used = [p.surface.dofs[p.paired] for p in pairs] + [
+            p.masters[p.paired].ravel() for p in pairs
+        ]
+        self.blocks = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
+        self.gdim = gdim
+        self.low = continuum.offset // gdim
+        self.mine = np.flatnonzero(
+            (self.blocks >= self.low) & (self.blocks < self.low + continuum.n_local // gdim)
+        )
+        self.comm = comm
+        local = (self.blocks[self.mine] - self.low)[:, None] * gdim + np.arange(gdim)
+        self.which = self.share(supports.which[local].astype(float)).astype(np.int64)
+        self.value = self.share(supports.value[local])
+
+    def share(self, mine: Array) -> Array:
+        """Combine what owners know of their nodes, shape (n_mine, gdim) to (n_blocks, gdim)."""
+        out = np.zeros((len(self.blocks), self.gdim))
+        for where, what in self.comm.allgather((self.mine, mine)):
+            out[where] = what
+        return out
+
+    def find(self, dofs: Ints) -> Ints:
+        """Position of global displacement nodes in the replica."""
+        return np.searchsorted(self.blocks, dofs)
+
+
+def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -> bool:
+    """Whether two prescribed dofs always have the same displacement."""
+    if not a.moves and not b.moves:
+        return True
+    one, other = a.scale * at_a, b.scale * at_b
+    return a.support.amplitude == b.support.amplitude and abs(one - other) <= 1e-12 * abs(one)
+
+
+def _check_slaves(pairs: list[Pair], replica: _Replica, supports: Supports) -> None:
+    """Enforce the rules of design.md, section 2; the same verdict on every rank."""
+    seen: dict[int, str] = {}
+    for pair in pairs:
+        for node in np.flatnonzero(pair.paired):
+            dof = int(pair.surface.dofs[node])
+            if dof in seen:
+                raise InterfaceError(
+                    f"the node at {pair.surface.x[node]} is a slave of interface '{seen[dof]}' "
+                    f"and of '{pair.title}'; a node can be a slave only once: "
+                    "let the surfaces end before each other or exchange slave and master of one"
+                )
+            seen[dof] = pair.title
+        slave = replica.find(pair.surface.dofs)
+        for node in np.flatnonzero(pair.paired):
+            i = slave[node]
+            for c in np.flatnonzero(replica.which[i] >= 0):
+                used = replica.find(pair.masters[node][pair.weights[node] != 0.0])
+                carried = replica.which[used, c]
+                column = supports.columns[replica.which[i, c]]
+                same = np.array(
+                    [
+                        k >= 0 and _moves_alike(supports.columns[k], column, a, replica.value[i, c])
+                        for k, a in zip(carried, replica.value[used, c], strict=True)
+                    ]
+                )
+                if not np.all(same):
+                    title = supports.columns[replica.which[i, c]].title
+                    raise InterfaceError(
+                        f"support '{title}' holds the slave node at {pair.surface.x[node]} of "
+                        f"interface '{pair.title}', but not its master nodes in the same way; "
+                        "support both faces there alike, or end the support or the interface "
+                        "before each other"
+                    )
+
+
+def build_coordinates(
+    continuum: Continuum,
+    pairs: list[Pair],
+    roles: list[npt.NDArray[np.int8]],
+    supports: Supports,
+    n_borders: int,
+) -> JumpCoordinates:
+    """Number the coordinates and build T; collective.
+
+    Args:
+        continuum: Displacement space.
+        pairs: Interfaces.
+        roles: HELD, INNER or WINDOW per pair and jump component, shape (n_nodes, gdim).
+        supports: Prescribed components.
+        n_borders: Empty columns to append.
+
+    Raises:
+        InterfaceError: A slave used twice, a cycle of slaves and masters, a support on a slave
+            node that its masters do not share.
+    """
+    gdim, comm = continuum.gdim, continuum.comm
+    replica = _Replica(continuum, pairs, supports)
+    _check_slaves(pairs, replica, supports)
+    slaves = [replica.find(p.surface.dofs) for p in pairs]
+    paired = [np.flatnonzero(p.paired) for p in pairs]
+
+    def at_slaves(table: Array | Ints, fill: float) -> list[Array]:
+        out = []
+        for p, s, k in zip(pairs, slaves, paired, strict=True):
+            rows = np.full((p.surface.n_nodes, gdim), fill, dtype=table.dtype)
+            rows[k] = table[s[k]]
+            out.append(rows)
+        return out
+
+    frames, held = align_frames(
+        pairs,
+        at_slaves(replica.which, -1),  # type: ignore[arg-type]
+        at_slaves(replica.value, 0.0),
+        supports,
+        gdim,
+    )
+    roles = [
+        np.where(h | ~p.paired[:, None], HELD, r)
+        for r, h, p in zip(roles, held, pairs, strict=True)
+    ]
+
+    # which owned dof slots have a column of their own
+    own = np.asarray(supports.which < 0)
+    is_slave = np.zeros((len(replica.blocks), gdim), dtype=bool)
+    inner_slave = np.zeros((len(replica.blocks), gdim), dtype=bool)
+    for s, k, role in zip(slaves, paired, roles, strict=True):
+        is_slave[s[k]] = True
+        inner_slave[s[k]] = role[k] == INNER
+    mine = (replica.blocks[replica.mine] - replica.low)[:, None] * gdim + np.arange(gdim)
+    slave_here = is_slave[replica.mine]
+    own[mine[slave_here]] = inner_slave[replica.mine][slave_here]
+
+    index, n_window = [], 0
+    for role in roles:
+        number = np.full(role.shape, -1, dtype=np.int64)
+        inside = role == WINDOW
+        number[inside] = n_window + np.arange(int(inside.sum()))
+        n_window += int(inside.sum())
+        index.append(number)
+    n_supports = len(supports.columns)
+    n_inner = int(own.sum())
+    counts = comm.allgather(n_inner)
+    extra = n_window + n_supports + n_borders
+    first = counts[0]
+    start = sum(counts[: comm.rank]) + (extra if comm.rank > 0 else 0)
+    n_columns = sum(counts) + extra
+    column = np.full(continuum.n_local, -1, dtype=np.int64)
+    column[own] = start + np.arange(n_inner)
+    shared = replica.share(column[mine].astype(float)).astype(np.int64)
+
+    rows = _interface_rows(
+        replica, pairs, slaves, paired, frames, index, is_slave, shared, first, n_window, n_columns
+    )
+    transform = _assemble(
+        continuum, supports, replica, is_slave, mine, column, rows, first + n_window,
+        (n_inner + (extra if comm.rank == 0 else 0), n_columns),
+    )  # fmt: skip
+    return JumpCoordinates(
+        transform, frames, held, index, n_window, n_supports, n_borders, n_inner, first
+    )
+
+
+def _interface_rows(
+    replica: _Replica,
+    pairs: list[Pair],
+    slaves: list[Ints],
+    paired: list[Ints],
+    frames: list[Array],
+    index: list[Ints],
+    is_slave: npt.NDArray[np.bool_],
+    shared: Ints,
+    first: int,
+    n_window: int,
+    n_columns: int,
+) -> sp.csr_matrix:
+    """Rows of T for all interface dofs, chains composed, shape (gdim n_blocks, n_columns)."""
+    gdim = replica.gdim
+    n = gdim * len(replica.blocks)
+    slave_flat = is_slave.ravel()
+    column, which, value = shared.ravel(), replica.which.ravel(), replica.value.ravel()
+    base_rows = np.flatnonzero(~slave_flat & (column >= 0))
+    held_rows = np.flatnonzero(~slave_flat & (which >= 0))
+    entries = [
+        (base_rows, column[base_rows], np.ones(len(base_rows))),
+        (held_rows, first + n_window + which[held_rows], value[held_rows]),
+    ]
+    links = []
+    for pair, s, k, frame, number in zip(pairs, slaves, paired, frames, index, strict=True):
+        masters = replica.find(pair.masters[k])
+        weights = pair.weights[k]
+        for c in range(gdim):
+            row = np.broadcast_to((gdim * s[k] + c)[:, None], masters.shape)
+            links.append((row.ravel(), (gdim * masters + c).ravel(), weights.ravel()))
+        for j in range(gdim):
+            inner = column[gdim * s[k] + j]
+            target = np.where(number[k, j] >= 0, first + number[k, j], inner)
+            has = target >= 0
+            for c in range(gdim):
+                entries.append((gdim * s[k][has] + c, target[has], frame[k, c, j][has]))
+
+    def matrix(parts: list[tuple[Ints, Ints, Array]], width: int) -> sp.csr_matrix:
+        r, c, v = (np.concatenate(p) for p in zip(*parts, strict=True))
+        keep = v != 0.0
+        return sp.csr_matrix((v[keep], (r[keep], c[keep])), shape=(n, width))
+
+    base = matrix(entries, n_columns)
+    if not links:
+        return base
+    chain = matrix(links, n)
+    inside = chain[slave_flat][:, slave_flat]
+    groups, _ = connected_components(inside, directed=True, connection="strong")
+    if groups < inside.shape[0] or inside.diagonal().any():
+        names = ", ".join(f"'{p.title}'" for p in pairs)
+        raise InterfaceError(
+            f"interfaces {names} form a cycle: a slave node is master of a node that is in turn "
+            "its master; exchange slave and master of one of them"
+        )
+    rows = base
+    for _ in range(len(pairs)):
+        rows = base + chain @ rows
+    return sp.csr_matrix(rows)
+
+
+def _assemble(
+    continuum: Continuum,
+    supports: Supports,
+    replica: _Replica,
+    is_slave: npt.NDArray[np.bool_],
+    mine: Ints,
+    column: Ints,
+    rows: sp.csr_matrix,
+    support_column: int,
+    size: tuple[int, int],
+) -> PETSc.Mat:
+    """T from the single-entry rows of ordinary dofs and the interface rows of slaves."""
+    gdim, n_local = continuum.gdim, continuum.n_local
+    slave_here = is_slave[replica.mine]
+    local = mine[slave_here]
+    global_rows = (gdim * replica.mine[:, None] + np.arange(gdim))[slave_here]
+    single = (supports.which >= 0) | (column >= 0)
+    single[local] = False
+    r = np.flatnonzero(single)
+    held = supports.which[r] >= 0
+    c = np.where(held, support_column + supports.which[r], column[r])
+    v = np.where(held, supports.value[r], 1.0)
+    block = rows[global_rows].tocoo()
+    csr = sp.csr_matrix(
+        (
+            np.concatenate([v, block.data]),
+            (np.concatenate([r, local[block.row]]), np.concatenate([c, block.col])),
+        ),
+        shape=(n_local, size[1]),
+    )
+    csr.sort_indices()
+    transform = PETSc.Mat().createAIJ(
+        ((n_local, continuum.n_global), size),
+        csr=(
+            csr.indptr.astype(PETSc.IntType),
+            csr.indices.astype(PETSc.IntType),
+            csr.data.astype(PETSc.ScalarType),
+        ),
+        comm=continuum.comm,
+    )
+    transform.assemble()
+    return transform

@@ -1,0 +1,199 @@
+"""Pairing a slave surface with a master surface: weights, frames, gaps, bonded set.
+
+    u_s = sum_m W_sm u_m + R_s delta_s,    delta = (opening, slip, tear)
+
+n, the first column of R, points from master to slave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack import log
+from fxcrack.continuum import Continuum
+from fxcrack.errors import InterfaceError, InputError
+from fxcrack.interface.projection import project
+from fxcrack.interface.surface import FacetSurface, gather_surface
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+Bonded = str | Callable[[Array], Array] | Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """Two facing surfaces, partly bonded; the crack runs between them.
+
+    Args:
+        slave: Facet group of the slave side.
+        master: Facet group of the master side; must extend under every bonded slave node.
+        bonded: The initially bonded slave nodes: the name of a group, a function of positions of
+            shape (3, n) that returns n booleans, an array of booleans per slave node (in the
+            order of ``Pair.surface``), or ``None``: all of them, and no tip exists.
+        contact: Open faces cannot pass through each other (unilateral, frictionless).
+        normal_only: Bonds hold the opening only and let the faces slip.
+        tolerance: Search tolerance, length: how far a slave node may lie from the master surface;
+            a tenth of the master's facet size by default.
+        gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
+        name: What the history calls the interface; the slave's name by default.
+    """
+
+    slave: str
+    master: str
+    bonded: Bonded = None
+    contact: bool = False
+    normal_only: bool = False
+    tolerance: float | None = None
+    gap: str = "adjust"
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse contradictions that need no mesh."""
+        if self.slave == self.master:
+            raise InterfaceError(
+                f"interface '{self.slave}' pairs a surface with itself; self-contact is not "
+                "possible here: name two distinct facet groups"
+            )
+        if self.gap not in ("adjust", "keep"):
+            raise InterfaceError(f"gap = '{self.gap}': choose 'adjust' or 'keep'")
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.slave
+
+
+@dataclass(frozen=True)
+class Pair:
+    """An interface on a mesh, the same on every rank.
+
+    Attributes:
+        interface: What the user asked for.
+        surface: Slave surface; its node numbers are the slave node numbers.
+        paired: Slave nodes that have a master point, shape (n_nodes,).
+        masters: Global displacement nodes of the masters, shape (n_nodes, k).
+        weights: Their weights, shape (n_nodes, k).
+        frames: Columns n, t1, t2 (n, t in 2-D), shape (n_nodes, gdim, gdim).
+        gap: Initial normal gap, shape (n_nodes,), length.
+        bonded: Initially bonded nodes, shape (n_nodes,).
+    """
+
+    interface: Interface
+    surface: FacetSurface
+    paired: Bools
+    masters: Ints
+    weights: Array
+    frames: Array
+    gap: Array
+    bonded: Bools
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.interface.title
+
+
+def local_frames(normals: Array, gdim: int) -> Array:
+    """Orthonormal frames whose first column is the normal.
+
+    Args:
+        normals: Unit normals, shape (n, 3).
+        gdim: 2 or 3.
+
+    Returns:
+        Shape (n, gdim, gdim); in 3-D the first tangent is the global axis most nearly in the
+        tangent plane, projected.
+    """
+    if gdim == 2:
+        n = normals[:, :2]
+        return np.stack([n, np.stack([-n[:, 1], n[:, 0]], axis=1)], axis=2)
+    axis = np.argmin(np.abs(normals) - 1e-6 * np.array([2.0, 1.0, 0.0]), axis=1)
+    reference = np.eye(3)[axis]
+    t1 = reference - np.einsum("ni,ni->n", reference, normals)[:, None] * normals
+    t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
+    return np.stack([normals, t1, np.cross(normals, t1)], axis=2)
+
+
+def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continuum) -> Bools:
+    """Initially bonded slave nodes, shape (n_nodes,).
+
+    Raises:
+        InterfaceError: The specification does not fit the surface.
+    """
+    chosen = interface.bonded
+    where = f"interface '{interface.title}'"
+    if chosen is None:
+        log.warn("%s: no bonded set given; the whole pair is bonded and has no crack tip", where)
+        return np.ones(surface.n_nodes, dtype=bool)
+    if isinstance(chosen, str):
+        owned = continuum.owned_nodes(chosen).astype(np.int32)
+        index_map = continuum.space.dofmap.index_map
+        mine = np.asarray(index_map.local_to_global(owned), dtype=np.int64)
+        named = np.concatenate(continuum.comm.allgather(mine))
+        stray = int(np.sum(~np.isin(named, surface.dofs)))
+        if stray:
+            log.warn("%s: %d nodes of bonded set '%s' are not slave nodes", where, stray, chosen)
+        return np.asarray(np.isin(surface.dofs, named))
+    if callable(chosen):
+        marks = np.asarray(chosen(np.ascontiguousarray(surface.x.T)))
+    else:
+        marks = np.asarray(chosen)
+    if marks.shape != (surface.n_nodes,):
+        raise InterfaceError(
+            f"{where}: bonded gives shape {marks.shape}; one boolean for each of the "
+            f"{surface.n_nodes} slave nodes is needed"
+        )
+    return marks.astype(bool)
+
+
+def make_pair(continuum: Continuum, interface: Interface) -> Pair:
+    """Pair slave and master surface; collective, the same result on every rank.
+
+    Raises:
+        InterfaceError: A bonded slave node lies outside the master surface, the two surfaces
+            share nodes, or the bonded set does not fit.
+    """
+    slave = gather_surface(continuum, interface.slave)
+    master = gather_surface(continuum, interface.master)
+    where = f"interface '{interface.title}'"
+    shared = np.intersect1d(slave.dofs, master.dofs)
+    if len(shared):
+        raise InterfaceError(
+            f"{where}: surfaces '{interface.slave}' and '{interface.master}' share {len(shared)} "
+            "nodes; the two sides need nodes of their own (split the mesh there, fxcrack.Split)"
+        )
+    bonded = bonded_nodes(interface, slave, continuum)
+    foot = project(slave.x, master)
+    tolerance = interface.tolerance or 0.1 * master.facet_size
+    paired = foot.distance <= tolerance
+    lost = bonded & ~paired
+    if np.any(lost):
+        i = int(np.argmax(np.where(lost, foot.distance, -1.0)))
+        raise InterfaceError(
+            f"{where}: {int(lost.sum())} bonded slave nodes lie outside the master surface "
+            f"'{interface.master}', the farthest at {slave.x[i]} by {foot.distance[i]:.3g} "
+            f"(search tolerance {tolerance:.3g}); let the master surface extend under them, "
+            "take them out of the bonded set, or raise Interface(tolerance=...)"
+        )
+    normals = np.where(slave.order >= 1, -slave.normals, 0.0)
+    gap = np.einsum("ni,ni->n", slave.x - foot.foot, normals)
+    if interface.gap == "adjust":
+        gap = np.zeros(len(gap))
+    return Pair(
+        interface=interface,
+        surface=slave,
+        paired=paired,
+        masters=master.dofs[master.facets[foot.facet]],
+        weights=foot.weights,
+        frames=local_frames(normals, continuum.gdim),
+        gap=gap,
+        bonded=bonded,
+    )
+
+
+__all__ = ["Bonded", "InputError", "Interface", "Pair", "local_frames", "make_pair"]

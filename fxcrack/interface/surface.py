@@ -1,0 +1,228 @@
+"""A named facet group as a small mesh of its own, replicated whole on every rank.
+
+Nodes are displacement nodes (so a second-order displacement brings midside nodes); their order
+and that of the facets follow the input order of the cells and not the partition.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import basix
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack import compat
+from fxcrack.continuum import Continuum
+from fxcrack.errors import InterfaceError, agree
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@lru_cache(maxsize=16)
+def facet_element(kind: str, order: int) -> basix.finite_element.FiniteElement:
+    """Lagrange element of a facet ("interval", "triangle", "quadrilateral")."""
+    return basix.create_element(
+        basix.ElementFamily.P,
+        getattr(basix.CellType, kind),
+        order,
+        basix.LagrangeVariant.equispaced,
+    )
+
+
+def shape_functions(kind: str, order: int, xi: Array) -> tuple[Array, Array]:
+    """Shape functions of a facet and their derivatives.
+
+    Args:
+        kind: Facet cell.
+        order: 1 or 2.
+        xi: Reference points, shape (m, dim).
+
+    Returns:
+        Values, shape (m, n_nodes), and gradients, shape (dim, m, n_nodes).
+    """
+    table = facet_element(kind, order).tabulate(1, xi)[..., 0]
+    return np.asarray(table[0]), np.asarray(table[1:])
+
+
+@dataclass(frozen=True)
+class FacetSurface:
+    """Facets of a named group with their displacement nodes.
+
+    Attributes:
+        name: Group name.
+        kind: Facet cell: "interval", "triangle" or "quadrilateral".
+        order: Order of the facet's shape functions.
+        dofs: Global displacement node (block index) of each node, shape (n_nodes,).
+        x: Node positions, shape (n_nodes, 3), length.
+        facets: Node numbers per facet in basix order, shape (n_facets, nodes_per_facet).
+        inner: A point inside the cell behind each facet, shape (n_facets, 3).
+        breadth: Out-of-plane extent at the nodes (1 in 3-D), shape (n_nodes,).
+    """
+
+    name: str
+    kind: str
+    order: int
+    dofs: Ints
+    x: Array
+    facets: Ints
+    inner: Array
+    breadth: Array
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of nodes."""
+        return len(self.dofs)
+
+    @property
+    def dim(self) -> int:
+        """Dimension of the facets: 1 or 2."""
+        return 1 if self.kind == "interval" else 2
+
+    @property
+    def n_corners(self) -> int:
+        """Corner nodes per facet; they come first in a facet's row."""
+        return {"interval": 2, "triangle": 3, "quadrilateral": 4}[self.kind]
+
+    def facet_normals(self, xi: Array) -> tuple[Array, Array]:
+        """Outward area vectors of every facet at reference points.
+
+        Args:
+            xi: Reference points, shape (m, dim).
+
+        Returns:
+            Unit outward normals and Jacobians, shapes (n_facets, m, 3) and (n_facets, m).
+        """
+        _, gradient = shape_functions(self.kind, self.order, xi)
+        tangents = np.einsum("dmk,fkc->dfmc", gradient, self.x[self.facets])
+        if self.dim == 1:
+            area = np.cross(tangents[0], [0.0, 0.0, 1.0])
+        else:
+            area = np.cross(tangents[0], tangents[1])
+        outward = self.x[self.facets[:, : self.n_corners]].mean(axis=1) - self.inner
+        area *= np.where(np.einsum("fmc,fc->fm", area, outward) < 0.0, -1.0, 1.0)[..., None]
+        size = np.linalg.norm(area, axis=-1)
+        return area / np.where(size > 0.0, size, 1.0)[..., None], size
+
+    @cached_property
+    def normals(self) -> Array:
+        """Outward unit normals at the nodes, averaged by area, shape (n_nodes, 3)."""
+        points = np.asarray(facet_element(self.kind, self.order).points)
+        unit, size = self.facet_normals(points)
+        total = np.zeros((self.n_nodes, 3))
+        np.add.at(total, self.facets, unit * size[..., None])
+        return total / np.linalg.norm(total, axis=1, keepdims=True)
+
+    @cached_property
+    def areas(self) -> Array:
+        """Tributary area of each node, the integral of its shape function, shape (n_nodes,)."""
+        xi, weights = basix.make_quadrature(getattr(basix.CellType, self.kind), 2 * self.order + 2)
+        values, _ = shape_functions(self.kind, self.order, np.asarray(xi))
+        _, size = self.facet_normals(np.asarray(xi))
+        breadth = self.breadth[self.facets] @ values.T
+        total = np.zeros(self.n_nodes)
+        np.add.at(total, self.facets, np.einsum("m,fm,mk->fk", weights, size * breadth, values))
+        return total
+
+    @cached_property
+    def facet_size(self) -> float:
+        """Median distance of neighbouring corners, length."""
+        corners = self.x[self.facets[:, : self.n_corners]]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
+        return float(np.median(edges))
+
+
+def _closure_table(cell: basix.CellType, order: int) -> tuple[str, Ints]:
+    """Facet cell and, per local facet, the cell's dofs in the facet element's order."""
+    tdim = len(basix.topology(cell)) - 1
+    element = basix.create_element(
+        basix.ElementFamily.P, cell, order, basix.LagrangeVariant.equispaced
+    )
+    kinds = basix.cell.subentity_types(cell)[tdim - 1]
+    kind = kinds[0].name
+    corners = basix.geometry(cell)
+    points = np.asarray(facet_element(kind, order).points)
+    table = []
+    for vertices in basix.topology(cell)[tdim - 1]:
+        base = corners[vertices[0]]
+        axes = [corners[v] - base for v in vertices[1:tdim]]
+        where = base + points @ np.asarray(axes)
+        distance = np.linalg.norm(where[:, None] - np.asarray(element.points)[None], axis=-1)
+        table.append(np.argmin(distance, axis=1))
+    return kind, np.asarray(table, dtype=np.int64)
+
+
+def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
+    """Collect a facet group on every rank; collective.
+
+    Raises:
+        InterfaceError: The group is empty or some of its facets lie inside the body.
+    """
+    domain, tdim = continuum.mesh.domain, continuum.mesh.tdim
+    topology = domain.topology
+    group = continuum.mesh.group(name, dim=tdim - 1).entities
+    topology.create_connectivity(tdim - 1, tdim)
+    topology.create_connectivity(tdim, tdim - 1)
+    to_cell = topology.connectivity(tdim - 1, tdim)
+    to_facet = topology.connectivity(tdim, tdim - 1)
+    n_cells = topology.index_map(tdim).size_local
+    cells, local = [], []
+    inside = 0
+    for facet in group:
+        attached = to_cell.links(facet)
+        inside += len(attached) > 1
+        cell = attached[0]
+        if cell < n_cells:
+            cells.append(cell)
+            local.append(int(np.flatnonzero(to_facet.links(cell) == facet)[0]))
+    problem = None
+    if inside:
+        problem = (
+            f"facet group '{name}' has facets inside the body; slave and master surfaces must be "
+            "boundaries: mesh the two sides apart, or split the mesh there (fxcrack.Split)"
+        )
+    agree(continuum.comm, problem, InterfaceError)
+
+    element = continuum.space.element.basix_element
+    kind, table = _closure_table(element.cell_type, continuum.order)
+    cells_array = np.asarray(cells, dtype=np.int64)
+    local_array = np.asarray(local, dtype=np.int64)
+    dofmap = continuum.space.dofmap.list
+    dofs = dofmap[cells_array[:, None], table[local_array]]
+    index_map = continuum.space.dofmap.index_map
+    blocks = np.asarray(index_map.local_to_global(dofs.ravel().astype(np.int32)), dtype=np.int64)
+    geometry = compat.geometry_dofmap(domain)
+    x = domain.geometry.x
+    inner = np.asarray([x[geometry[c]].mean(axis=0) for c in cells]).reshape(-1, 3)
+    key = np.asarray(compat.original_cell_index(domain), dtype=np.int64)[cells_array]
+    mine = (
+        key,
+        local_array,
+        blocks.reshape(dofs.shape),
+        continuum.positions()[dofs],
+        inner,
+    )
+    parts = [p for p in continuum.comm.allgather(mine) if len(p[0])]
+    if not parts:
+        raise InterfaceError(f"facet group '{name}' of mesh '{continuum.mesh.name}' is empty")
+    key, which, blocks, points, inner = (np.concatenate(c) for c in zip(*parts, strict=True))
+    order = np.lexsort((which, key))
+    blocks, points, inner = blocks[order], points[order], inner[order]
+    unique, first, inverse = np.unique(blocks.ravel(), return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    position = np.empty((len(unique), 3))
+    position[rank] = points.reshape(-1, 3)[first]
+    node_dofs = np.empty(len(unique), dtype=np.int64)
+    node_dofs[rank] = unique
+    return FacetSurface(
+        name=name,
+        kind=kind,
+        order=continuum.order,
+        dofs=node_dofs,
+        x=position,
+        facets=rank[inverse].reshape(blocks.shape),
+        inner=inner,
+        breadth=continuum.model.breadth(position),
+    )

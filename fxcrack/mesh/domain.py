@@ -1,0 +1,101 @@
+"""Named groups on a DOLFINx mesh the user has made, from markers or arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import fxcrack.compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+import dolfinx.la
+import dolfinx.mesh
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.errors import MeshError, agree
+from fxcrack.mesh.mesh import Group, Mesh
+
+Marker = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
+
+
+def mesh_from_domain(
+    domain: dolfinx.mesh.Mesh,
+    groups: Mapping[str, tuple[int, Marker | npt.ArrayLike]],
+    *,
+    name: str = "mesh",
+) -> Mesh:
+    """Give a DOLFINx mesh named groups; collective.
+
+    Args:
+        domain: The mesh. Make it with ghost mode ``shared_facet`` where facets inside it count.
+        groups: For each name the dimension of the entities and either a function of position
+            (``x`` of shape (3, n_points) to booleans, an entity is in where all its vertices are)
+            or local entity indices. An entity that one rank names is in on every rank that sees it.
+        name: What messages and files call the mesh.
+
+    Raises:
+        MeshError: Names or dimensions differ between ranks or an index is out of range.
+
+    Example:
+        ``mesh_from_domain(domain, {"left": (1, lambda x: np.isclose(x[0], 0.0))})``
+    """
+    comm = domain.comm
+    tdim = domain.topology.dim
+    asked = [(key, int(dim)) for key, (dim, _) in groups.items()]
+    problem = None
+    wrong = [key for key, dim in asked if not 0 <= dim <= tdim]
+    if wrong:
+        problem = (
+            f"group '{wrong[0]}' has dimension {dict(asked)[wrong[0]]}; a mesh of {tdim}-D cells "
+            f"has entities of dimension 0 (nodes) to {tdim} (cells)"
+        )
+    if any(other != asked for other in comm.allgather(asked)):
+        problem = "the ranks name different groups; pass the same names and dimensions on each"
+    agree(comm, _headed(name, problem), MeshError)
+
+    found: dict[str, Group] = {}
+    for key, (dim, choice) in groups.items():
+        domain.topology.create_entities(dim)
+        domain.topology.create_connectivity(dim, tdim)
+        domain.topology.create_connectivity(dim, 0)
+        if callable(choice):
+            entities = dolfinx.mesh.locate_entities(domain, dim, choice)
+        else:
+            entities = np.asarray(choice)
+            agree(comm, _headed(name, _fault(domain, key, dim, entities)), MeshError)
+        found[key] = Group(dim, _on_all_ranks(domain, dim, entities))
+    return Mesh(domain, found, name)
+
+
+def _headed(name: str, problem: str | None) -> str | None:
+    """The problem with the mesh it is about."""
+    return problem and f"mesh '{name}': {problem}"
+
+
+def _fault(
+    domain: dolfinx.mesh.Mesh, key: str, dim: int, entities: npt.NDArray[np.generic]
+) -> str | None:
+    """What is wrong with an array of entity indices on this rank."""
+    index_map = domain.topology.index_map(dim)
+    n_local = index_map.size_local + index_map.num_ghosts
+    if entities.ndim != 1 or not (np.issubdtype(entities.dtype, np.integer) or not entities.size):
+        return (
+            f"group '{key}' needs a one-dimensional array of integers, got {entities.dtype} of "
+            f"shape {entities.shape}; np.flatnonzero makes one from a mask"
+        )
+    if entities.size and not (0 <= int(entities.min()) and int(entities.max()) < n_local):
+        return (
+            f"group '{key}' holds index {int(entities.max())}, but rank {domain.comm.rank} has "
+            f"entities 0 to {n_local - 1} of dimension {dim}; pass local indices"
+        )
+    return None
+
+
+def _on_all_ranks(
+    domain: dolfinx.mesh.Mesh, dim: int, entities: npt.NDArray[np.generic]
+) -> npt.NDArray[np.int32]:
+    """The marked entities, owned and ghost, sorted, the same seen from every rank."""
+    marks = dolfinx.la.vector(domain.topology.index_map(dim), dtype=np.int32)
+    marks.array[:] = 0
+    marks.array[entities.astype(np.int32)] = 1
+    marks.scatter_reverse(dolfinx.la.InsertMode.add)
+    marks.scatter_forward()
+    return np.flatnonzero(marks.array).astype(np.int32)

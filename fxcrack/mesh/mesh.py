@@ -1,0 +1,83 @@
+"""A distributed mesh together with its named groups of cells, facets, edges and nodes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+import dolfinx.mesh
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from fxcrack.errors import MeshError
+
+
+@dataclass(frozen=True)
+class Group:
+    """A named set of mesh entities of one dimension, as this rank sees it.
+
+    Attributes:
+        dim: Topological dimension of the entities (0 nodes, ..., tdim cells).
+        entities: Local indices, owned and ghost, sorted, shape (n_entities,).
+    """
+
+    dim: int
+    entities: npt.NDArray[np.int32]
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A DOLFINx mesh and its named groups.
+
+    Attributes:
+        domain: The DOLFINx mesh.
+        groups: Named groups, the same names on every rank.
+        name: What messages and files call the mesh.
+    """
+
+    domain: dolfinx.mesh.Mesh
+    groups: dict[str, Group]
+    name: str = "mesh"
+
+    @property
+    def comm(self) -> MPI.Intracomm:
+        """Communicator of the mesh."""
+        comm: MPI.Intracomm = self.domain.comm
+        return comm
+
+    @property
+    def gdim(self) -> int:
+        """Geometric dimension, 2 or 3."""
+        return int(self.domain.geometry.dim)
+
+    @property
+    def tdim(self) -> int:
+        """Topological dimension of the cells."""
+        return int(self.domain.topology.dim)
+
+    @property
+    def order(self) -> int:
+        """Order of the geometry, 1 or 2."""
+        return int(compat.coordinate_map(self.domain).degree)
+
+    def group(self, name: str, *, dim: int | None = None) -> Group:
+        """The group called ``name``.
+
+        Args:
+            name: Name of a physical group.
+            dim: Dimension the group must have; ``None`` accepts any.
+
+        Raises:
+            MeshError: The name is unknown or its dimension is another one.
+        """
+        if name not in self.groups:
+            known = ", ".join(f"{n} (dim {g.dim})" for n, g in sorted(self.groups.items()))
+            raise MeshError(f"mesh '{self.name}' has no group '{name}'; it has: {known or 'none'}")
+        found = self.groups[name]
+        if dim is not None and found.dim != dim:
+            raise MeshError(
+                f"group '{name}' of mesh '{self.name}' holds entities of dimension {found.dim}, "
+                f"but dimension {dim} is needed here"
+            )
+        return found

@@ -1,0 +1,142 @@
+"""Meshes from gmsh: models in memory and .msh files, with every physical group a named group.
+
+gmsh is touched on rank 0 only; what goes wrong there is raised on every rank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from mpi4py import MPI
+
+from fxcrack.errors import MeshError
+from fxcrack.mesh.distribute import distribute
+from fxcrack.mesh.extract import extract
+from fxcrack.mesh.mesh import Mesh
+from fxcrack.mesh.raw import RawMesh, check_shapes, on_root
+from fxcrack.mesh.split import Split, split_surface
+
+
+def read_mesh(
+    path: str | Path,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    gdim: int | None = None,
+    split: Sequence[Split] = (),
+) -> Mesh:
+    """Read a gmsh .msh file; collective.
+
+    Args:
+        path: The file, of any .msh version gmsh reads; opened on rank 0 only.
+        comm: Communicator to distribute the mesh over.
+        gdim: Geometric dimension; ``None`` takes that of the cells.
+        split: Internal surfaces to split into slave and master sides, in this order.
+
+    Returns:
+        The mesh, named after the file.
+
+    Raises:
+        MeshError: The file is missing or not a .msh file, or as :func:`mesh_from_gmsh`.
+    """
+    path = Path(path)
+
+    def work() -> RawMesh:
+        if path.suffix.lower() != ".msh":
+            raise MeshError(
+                f"'{path}' is not a .msh file; write one with gmsh.write('{path.stem}.msh')"
+            )
+        if not path.is_file():
+            raise MeshError(f"there is no mesh file '{path}' (looked in {Path.cwd()})")
+        with gmsh_model(path.stem) as gmsh:
+            try:
+                gmsh.merge(str(path))
+            except Exception as error:
+                raise MeshError(f"gmsh cannot read '{path}': {error}") from error
+            return prepare(gmsh.model, path.stem, gdim, split)
+
+    return distribute(on_root(comm, work), comm, path.stem)
+
+
+def mesh_from_gmsh(
+    model: Any,
+    comm: MPI.Comm = MPI.COMM_WORLD,
+    *,
+    gdim: int | None = None,
+    split: Sequence[Split] = (),
+    name: str = "mesh",
+) -> Mesh:
+    """Make a mesh from the current, already meshed gmsh model; collective.
+
+    Physical groups become named groups, those without a name are called ``group_<dim>_<tag>``.
+    The cells are all elements of the highest dimension, in a group or not.
+
+    Args:
+        model: ``gmsh.model`` on rank 0; what the other ranks pass is not looked at.
+        comm: Communicator to distribute the mesh over.
+        gdim: Geometric dimension; ``None`` takes that of the cells.
+        split: Internal surfaces to split into slave and master sides, in this order.
+        name: What messages and files call the mesh.
+
+    Raises:
+        MeshError: No cells, several cell shapes, incomplete second order, a plane mesh out of
+            z = 0, coordinates that are not numbers, degenerate cells, a name used in two
+            dimensions, a group without elements or off the cells, a surface that cannot be split.
+    """
+
+    def work() -> RawMesh:
+        if model is None:
+            raise MeshError(
+                f"mesh '{name}': rank 0 got no gmsh model; build it there, None elsewhere"
+            )
+        return prepare(model, name, gdim, split)
+
+    return distribute(on_root(comm, work), comm, name)
+
+
+@contextmanager
+def gmsh_model(name: str) -> Iterator[Any]:
+    """A fresh gmsh model for the time of the block; yields the gmsh module.
+
+    A gmsh session the caller has opened is left open, with its model current again.
+    """
+    import gmsh
+
+    started = not gmsh.isInitialized()
+    before = None if started else gmsh.model.getCurrent()
+    if started:
+        gmsh.initialize(readConfigFiles=False, interruptible=False)
+        gmsh.option.setNumber("General.Terminal", 0)
+    try:
+        gmsh.model.add(name)
+        yield gmsh
+    finally:
+        if started:
+            gmsh.finalize()
+        else:
+            gmsh.model.remove()
+            gmsh.model.setCurrent(before)
+
+
+def prepare(model: Any, name: str, gdim: int | None = None, split: Sequence[Split] = ()) -> RawMesh:
+    """Read the current gmsh model, check it and split its surfaces; to be called where it lives.
+
+    Args:
+        model: ``gmsh.model``, meshed.
+        name: What messages call the mesh.
+        gdim: Geometric dimension the caller expects, ``None`` for any.
+        split: Internal surfaces to split, in this order.
+
+    Raises:
+        MeshError: As :func:`mesh_from_gmsh`.
+    """
+    try:
+        raw = extract(model, gdim)
+        check_shapes(raw)
+        for one in split:
+            raw = split_surface(raw, one)
+    except MeshError as error:
+        raise MeshError(f"mesh '{name}': {error}") from error
+    return raw

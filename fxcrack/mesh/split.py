@@ -1,0 +1,352 @@
+"""Splitting a conforming mesh along an internal named surface, before it is distributed.
+
+A node of the surface is given to each pair (cell, node) that holds it; pairs of one node are joined
+where their cells share a facet that holds the node and is not on the surface. Pieces of a node that
+lie on different sides of the surface become different nodes. On the inner border of the surface
+there is one piece only: such nodes, where the two sides stay grown together, are not doubled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import connected_components
+
+from fxcrack.errors import MeshError
+from fxcrack.mesh.raw import Floats, Ints, RawGroup, RawMesh, distinct, place, reference, row_ids
+
+_AMBIGUOUS = 1e-6
+
+
+@dataclass(frozen=True)
+class Split:
+    """Split the mesh along a named internal surface into a slave and a master side.
+
+    The slave side gets new nodes. The name of the surface goes; groups of facets, edges and nodes
+    that lie on it get both copies, those that only touch it stay with the cells they belong to.
+
+    Attributes:
+        surface: Group of facets inside the mesh; it may end inside the mesh or at its boundary.
+        slave: Name for the facets of the side ``toward`` points into.
+        master: Name for the facets of the other side.
+        toward: Direction from master to slave, shape (gdim,), any length; or the name of a group
+            of cells that holds the slave side, for surfaces that close on themselves.
+    """
+
+    surface: str
+    slave: str
+    master: str
+    toward: tuple[float, ...] | str
+
+
+@dataclass(frozen=True)
+class _Corners:
+    """Cells around a surface and their pairs (cell, node on the surface).
+
+    Attributes:
+        cells: Indices of the cells with a node on the surface, sorted, shape (n_near,).
+        nodes: Their nodes, shape (n_near, n_cell_nodes).
+        pair: Number of the pair of each entry of ``nodes``, -1 off the surface.
+        piece: Piece of its node each pair belongs to, numbered over all nodes, shape (n_pairs,).
+        facets: Surface facets as (cell, local facet) of both sides, shape (n_facets, 2, 2); cells
+            count within ``cells``.
+    """
+
+    cells: Ints
+    nodes: Ints
+    pair: Ints
+    piece: Ints
+    facets: Ints
+
+
+def split_surface(raw: RawMesh, split: Split) -> RawMesh:
+    """Split the mesh along one surface.
+
+    Args:
+        raw: The whole mesh, which is left as it is.
+        split: What to split.
+
+    Returns:
+        A new mesh with the nodes of the slave side appended.
+
+    Raises:
+        MeshError: The surface is unknown, not made of facets, on the boundary, branched or
+            one-sided, holds nothing to separate, or ``toward`` does not tell its sides apart; a
+            new name is taken.
+    """
+    _check_names(raw, split)
+    corners = _corners(raw, split.surface)
+    slave_side = _slave_sides(raw, split, corners)
+
+    # Pieces seen from the slave side of some surface facet and not from the master side.
+    table = _facet_nodes(raw)
+    held = [
+        _pieces(corners, table, corners.facets[np.arange(len(slave_side)), side])
+        for side in (slave_side, 1 - slave_side)
+    ]
+    moved = np.setdiff1d(held[0], held[1])
+    if not len(moved):
+        raise MeshError(
+            f"splitting along '{split.surface}' separates nothing: all its nodes are on its inner "
+            f"border; refine the mesh so that facets of the surface share nodes, or extend it to "
+            f"the boundary"
+        )
+    moves = np.zeros_like(corners.pair, dtype=bool)
+    on = corners.pair >= 0
+    moves[on] = np.isin(corners.piece[corners.pair[on]], moved)
+    doubled = np.unique(corners.nodes[moves])
+    renamed = corners.nodes.copy()
+    renamed[moves] = len(raw.points) + np.searchsorted(doubled, corners.nodes[moves])
+    cells = raw.cells.copy()
+    cells[corners.cells] = renamed
+
+    groups = {
+        name: RawGroup(group.dim, _images(raw, group, corners.nodes, renamed))
+        for name, group in raw.groups.items()
+        if name != split.surface
+    }
+    facet_dim = raw.tdim - 1
+    for name, side in ((split.slave, slave_side), (split.master, 1 - slave_side)):
+        cell, local = corners.facets[np.arange(len(side)), side].T
+        groups[name] = RawGroup(facet_dim, renamed[cell[:, None], table[local]])
+    points = np.concatenate((raw.points, raw.points[doubled]))
+    return replace(raw, points=points, cells=cells, groups=groups)
+
+
+def _check_names(raw: RawMesh, split: Split) -> None:
+    """Refuse unknown and clashing names and a ``toward`` of the wrong form."""
+    surface = raw.groups.get(split.surface)
+    if surface is None or surface.dim != raw.tdim - 1:
+        known = [n for n, g in raw.groups.items() if g.dim == raw.tdim - 1]
+        raise MeshError(
+            f"there is no group of facets '{split.surface}' to split along; groups of facets: "
+            f"{', '.join(sorted(known)) or 'none'}"
+        )
+    taken = set(raw.names) - {split.surface}
+    for name in (split.slave, split.master):
+        if name in taken or split.slave == split.master:
+            raise MeshError(
+                f"splitting along '{split.surface}' cannot make a group '{name}': the name is "
+                f"taken; choose names for slave and master that differ from each other and from "
+                f"{', '.join(sorted(taken)) or 'the surface'}"
+            )
+    if isinstance(split.toward, str):
+        if split.toward not in raw.cell_groups:
+            raise MeshError(
+                f"splitting along '{split.surface}': toward='{split.toward}' is no group of cells; "
+                f"groups of cells: {', '.join(sorted(raw.cell_groups)) or 'none'}"
+            )
+        return
+    toward = np.asarray(split.toward, dtype=float)
+    if toward.shape != (raw.tdim,) or not np.isfinite(toward).all() or not toward.any():
+        raise MeshError(
+            f"splitting along '{split.surface}': toward={split.toward} must be a direction of "
+            f"{raw.tdim} components, not all zero"
+        )
+
+
+def _facet_nodes(raw: RawMesh) -> Ints:
+    """Local nodes of each facet of the reference cell, vertices first."""
+    return np.array(reference(raw.cell, raw.order).entity_closure_dofs[raw.tdim - 1])
+
+
+def _corners(raw: RawMesh, surface: str) -> _Corners:
+    """Find the cells around a surface and break its nodes into pieces."""
+    n_vertices = raw.n_vertices(raw.tdim - 1)
+    table = _facet_nodes(raw)
+    rows = raw.groups[surface].rows
+    on_surface = np.zeros(len(raw.points), dtype=bool)
+    on_surface[rows] = True
+    near = np.flatnonzero(on_surface[raw.cells].any(axis=1))
+    nodes = raw.cells[near]
+
+    # All facets of these cells, then the surface itself; equal vertices, equal number.
+    facets = nodes[:, table].reshape(-1, table.shape[1])
+    both = np.concatenate((facets[:, :n_vertices], rows[:, :n_vertices]))
+    ids = row_ids(np.sort(both, axis=1))
+    facet_ids, surface_ids = ids[: len(facets)], ids[len(facets) :]
+    by_id = np.argsort(facet_ids, kind="stable")
+    first = np.flatnonzero(np.diff(facet_ids[by_id]) == 0)
+    couples = np.column_stack((by_id[first], by_id[first + 1]))
+    is_surface = np.isin(facet_ids[couples[:, 0]], surface_ids)
+    _check_two_sided(raw, surface, facet_ids, surface_ids, int(is_surface.sum()))
+
+    pair = np.full(nodes.shape, -1, dtype=np.int64)
+    on = on_surface[nodes]
+    pair[on] = np.arange(on.sum())
+    # Sorted by node, the two copies of a facet list the same nodes in the same order.
+    inner = couples[~is_surface]
+    cell, local = np.divmod(inner, len(table))
+    here = table[local]
+    here = np.take_along_axis(here, np.argsort(nodes[cell[..., None], here], axis=2), axis=2)
+    joined = pair[cell[..., None], here]
+    ends = np.column_stack((joined[:, 0].ravel(), joined[:, 1].ravel()))
+    ends = ends[ends[:, 0] >= 0]
+    _, piece = _components(int(on.sum()), ends)
+
+    sides = np.stack(np.divmod(couples[is_surface], len(table)), axis=2)
+    return _Corners(near, nodes, pair, piece, sides)
+
+
+def _check_two_sided(
+    raw: RawMesh, surface: str, facet_ids: Ints, surface_ids: Ints, n_inside: int
+) -> None:
+    """Refuse a surface whose facets do not all have a cell on either side."""
+    if n_inside == len(surface_ids):
+        return
+    n_cells = np.bincount(facet_ids, minlength=int(surface_ids.max()) + 1)[surface_ids]
+    bad = np.flatnonzero(n_cells != 2)[0]
+    n_vertices = raw.n_vertices(raw.tdim - 1)
+    where = place(raw.points[raw.groups[surface].rows[bad, :n_vertices]].mean(axis=0))
+    n_bad = int((n_cells != 2).sum())
+    if n_cells[bad] == 0:
+        raise MeshError(
+            f"{n_bad} of {len(surface_ids)} facets of '{surface}' belong to no cell, the first at "
+            f"{where}; the surface must be embedded in the mesh (fragment)"
+        )
+    raise MeshError(
+        f"{n_bad} of {len(surface_ids)} facets of '{surface}' are on the boundary of the mesh, the "
+        f"first at {where}; only a surface inside the mesh, with a cell on either side, can be "
+        f"split"
+    )
+
+
+def _pieces(corners: _Corners, table: Ints, side: Ints) -> Ints:
+    """Pieces of nodes held by facets (cell, local facet), shape (n_facets, 2), sorted."""
+    return np.unique(corners.piece[corners.pair[side[:, :1], table[side[:, 1]]]])
+
+
+def _slave_sides(raw: RawMesh, split: Split, corners: _Corners) -> Ints:
+    """Which of the two sides of each surface facet is the slave, 0 or 1, shape (n_facets,).
+
+    Sides of neighbouring facets belong together where they hold the same piece of a doubled node,
+    so each connected patch is oriented as a whole.
+    """
+    table = _facet_nodes(raw)
+    cell, local = corners.facets[..., 0], corners.facets[..., 1]
+    # Sorted by node, so that the columns of both sides mean the same nodes.
+    nodes = corners.nodes[cell[..., None], table[local]]
+    order = np.argsort(nodes, axis=2)
+    pair = np.take_along_axis(corners.pair[cell[..., None], table[local]], order, axis=2)
+    piece = corners.piece[pair]
+    _check_branches(raw, split.surface, np.take_along_axis(nodes, order, axis=2), piece)
+
+    n_facets = len(cell)
+    side_number = np.broadcast_to(np.arange(2 * n_facets).reshape(-1, 2, 1), piece.shape)
+    doubled = piece[:, 0] != piece[:, 1]
+    links = np.column_stack(
+        (
+            side_number.swapaxes(1, 2)[doubled].ravel(),
+            2 * n_facets + piece.swapaxes(1, 2)[doubled].ravel(),
+        )
+    )
+    _, patch = _components(2 * n_facets + int(corners.piece.max()) + 1, links)
+    patch = np.unique(patch[: 2 * n_facets], return_inverse=True)[1].reshape(-1, 2)
+    if np.any(patch[:, 0] == patch[:, 1]):
+        raise MeshError(
+            f"'{split.surface}' has only one side (it is twisted like a Moebius strip) and cannot "
+            f"be split into slave and master"
+        )
+    vote, size = _votes(raw, split, corners)
+    n_patches = int(patch.max()) + 1
+    total = np.bincount(patch.ravel(), np.column_stack((vote, -vote)).ravel(), n_patches)
+    sizes = np.bincount(patch.ravel(), np.column_stack((size, size)).ravel(), n_patches)
+    unclear = np.flatnonzero(np.abs(total) <= _AMBIGUOUS * sizes)
+    if len(unclear):
+        first = np.flatnonzero(patch[:, 0] == unclear[0])
+        first = first if len(first) else np.flatnonzero(patch[:, 1] == unclear[0])
+        where = place(raw.points[corners.nodes[cell[first[0], 0]]].mean(axis=0))
+        raise MeshError(
+            f"toward={split.toward!r} does not tell the sides of '{split.surface}' apart near "
+            f"{where}: it is perpendicular to the normal there, or the surface closes on itself; "
+            f"give a direction across the surface or the name of the group of cells on the slave "
+            f"side"
+        )
+    return (total[patch[:, 0]] < 0).astype(np.int64)
+
+
+def _votes(raw: RawMesh, split: Split, corners: _Corners) -> tuple[Floats, Floats]:
+    """How much each facet speaks for its side 0 as the slave, and the most it could.
+
+    Shapes (n_facets,) each: area times the cosine between the normal into side 0 and ``toward``.
+    """
+    cell, local = corners.facets[..., 0], corners.facets[..., 1]
+    if isinstance(split.toward, str):
+        inside = np.isin(corners.cells[cell], raw.cell_groups[split.toward]).astype(float)
+        return inside[:, 0] - inside[:, 1], np.ones(len(cell))
+    n_vertices = raw.n_vertices(raw.tdim - 1)
+    facet = corners.nodes[cell[:, :1], _facet_nodes(raw)[local[:, 0]]][:, :n_vertices]
+    x = raw.points[facet]
+    if raw.tdim == 2:
+        normal = (x[:, 1] - x[:, 0]) @ np.array([[0.0, -1.0], [1.0, 0.0]])
+    else:
+        # Two edges of a triangle; the diagonals of a quadrilateral in DOLFINx order.
+        normal = (
+            np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+            if n_vertices == 3
+            else np.cross(x[:, 3] - x[:, 0], x[:, 2] - x[:, 1])
+        )
+    across = raw.points[corners.nodes[cell[:, 0]]].mean(axis=1) - x.mean(axis=1)
+    normal *= np.sign(np.sum(normal * across, axis=1))[:, None]
+    toward = np.asarray(split.toward, dtype=float)
+    return normal @ (toward / np.linalg.norm(toward)), np.linalg.norm(normal, axis=1)
+
+
+def _check_branches(raw: RawMesh, surface: str, nodes: Ints, piece: Ints) -> None:
+    """Refuse a surface that parts the mesh around a node into more than two pieces."""
+    held = np.unique(np.column_stack((nodes.ravel(), piece.ravel())), axis=0)
+    owners, counts = np.unique(held[:, 0], return_counts=True)
+    if np.any(counts > 2):
+        where = place(raw.points[owners[counts > 2][0]])
+        raise MeshError(
+            f"'{surface}' branches or crosses itself at {where}; give its branches names of their "
+            f"own and split along one after the other"
+        )
+
+
+def _components(n: int, links: Ints) -> tuple[int, Ints]:
+    """Number of connected components of n vertices, and the component of each."""
+    graph = coo_array((np.ones(len(links), dtype=np.int8), (links[:, 0], links[:, 1])), (n, n))
+    count, labels = connected_components(graph, directed=False)
+    return int(count), labels.astype(np.int64)
+
+
+def _images(raw: RawMesh, group: RawGroup, nodes: Ints, renamed: Ints) -> Ints:
+    """What the entities of a group become: the distinct images in the cells that hold them.
+
+    Args:
+        raw: The mesh before the split.
+        group: The group before the split.
+        nodes: Nodes of the cells around the surface before the split.
+        renamed: The same after it.
+
+    Returns:
+        Nodes of the entities after the split, shape (n_entities, n_entity_nodes).
+    """
+    changed = np.zeros(len(raw.points), dtype=bool)
+    changed[nodes[nodes != renamed]] = True
+    touched = changed[group.rows].any(axis=1)
+    rows = group.rows[touched]
+    if not len(rows):
+        return group.rows
+    n_vertices = raw.n_vertices(group.dim)
+    shared = (
+        _incidence(rows[:, :n_vertices], len(raw.points)) @ _incidence(nodes, len(raw.points)).T
+    )
+    shared = coo_array(shared)
+    holds = shared.data == n_vertices
+    entity, cell = shared.row[holds], shared.col[holds]
+    # Where in the cell each node of the entity stands.
+    position = np.argmax(nodes[cell][:, None, :] == rows[entity][:, :, None], axis=2)
+    images = renamed[cell[:, None], position]
+    return np.concatenate((group.rows[~touched], images[distinct(images, n_vertices)[0]]))
+
+
+def _incidence(rows: Ints, n_nodes: int) -> csr_array:
+    """Sparse matrix with a one for every node of every row."""
+    n, width = rows.shape
+    ones: npt.NDArray[np.int32] = np.ones(rows.size, dtype=np.int32)
+    return csr_array((ones, rows.ravel(), np.arange(0, rows.size + 1, width)), shape=(n, n_nodes))

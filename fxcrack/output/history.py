@@ -1,0 +1,98 @@
+"""The history of an analysis: a table with one row per event, and how it is written.
+
+Columns (brackets hold the name of a support, load, monitor or interface):
+time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[..] load factor and
+its work-conjugate displacement, m[..] monitored displacement, a[..] crack length, area[..] open
+area, f[..] largest criterion value and GI, GII, GIII[..] there, node[..] where, released[..]
+number of released nodes; strain_energy, external_work, released_energy, balance.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from fxcrack.errors import unknown_name
+from fxcrack.output.atomic import replacing
+
+Row = dict[str, float | int | str]
+
+
+class History:
+    """Rows of an analysis, the same on every rank.
+
+    Args:
+        comm: Communicator; rank 0 writes files.
+
+    Attributes:
+        rows: One dictionary per row.
+        reason: Why the last step ended.
+        details: What else is worth keeping (timings, window, releases), plain types only.
+    """
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self._comm = comm
+        self.rows: list[Row] = []
+        self.reason = ""
+        self.details: dict[str, Any] = {}
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Row]:
+        """Rows in order."""
+        return iter(self.rows)
+
+    @property
+    def columns(self) -> list[str]:
+        """Column names in order of first appearance."""
+        return list(dict.fromkeys(k for row in self.rows for k in row))
+
+    def append(self, row: Row) -> None:
+        """Add a row."""
+        self.rows.append(row)
+
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
+        """A column as an array, NaN where a row lacks it.
+
+        Raises:
+            InputError: No row has the column.
+        """
+        if self.rows and column not in self.columns:
+            unknown_name("column", column, self.columns)
+        return np.array([row.get(column, np.nan) for row in self.rows])
+
+    def at(self, column: str, value: float, *, event: str | None = None) -> Row:
+        """First row where a column reaches a value (to round-off), optionally of one event."""
+        for row in self.rows:
+            found = row.get(column, np.nan)
+            if event is not None and row["event"] != event:
+                continue
+            if isinstance(found, (int, float)) and found >= value - 1e-9 * abs(value):
+                return row
+        unknown_name(f"row with {column} >=", str(value), [f"{len(self.rows)} rows"])
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all rows as comma-separated values; collective, rank 0 writes."""
+        if self._comm.rank == 0:
+            with replacing(path) as temporary, temporary.open("w", newline="") as stream:
+                writer = csv.DictWriter(stream, self.columns)
+                writer.writeheader()
+                writer.writerows(self.rows)
+        self._comm.Barrier()
+
+    def to_json(self, path: str | Path) -> None:
+        """Write rows, reason and details as JSON; collective, rank 0 writes."""
+        if self._comm.rank == 0:
+            content = {"reason": self.reason, "details": self.details, "rows": self.rows}
+            with replacing(path) as temporary:
+                temporary.write_text(json.dumps(content, indent=1))
+        self._comm.Barrier()

@@ -1,0 +1,193 @@
+"""The scene: what the user writes. Composition only; the layers below do the work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack import log
+from fxcrack.continuum import Continuum
+from fxcrack.errors import InputError
+from fxcrack.interface.jumps import collect_supports
+from fxcrack.interface.pairing import Interface, make_pair
+from fxcrack.loads import Displacement, Load, Monitor
+from fxcrack.materials import Material
+from fxcrack.mesh import Mesh
+from fxcrack.models import Model
+from fxcrack.output.history import History
+from fxcrack.output.progress import Progress
+from fxcrack.solve.condensed import CondensedModel, CondensedOptions
+from fxcrack.steps.growth import Debond, Growth
+from fxcrack.steps.march import March
+from fxcrack.steps.static import Static
+from fxcrack.steps.until import CrackLength
+
+Array = npt.NDArray[np.float64]
+
+
+class Scene:
+    """Bodies, interfaces, supports and loads of one analysis.
+
+    Args:
+        mesh: Mesh with named groups.
+        materials: One material, or one per cell group.
+        model: Kinematic model.
+        supports: Prescribed displacements.
+        loads: Force patterns.
+        debonds: Interfaces that may come apart, with their criterion.
+        bonds: Interfaces that stay as they are (bonded parts tied, open parts open).
+        monitors: Displacements to watch.
+        order: Order of the displacement; that of the mesh by default.
+        options: How the continuum is condensed.
+
+    Raises:
+        InputError: The parts contradict each other; the message says which and how to mend it.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        *,
+        materials: Material | Mapping[str, Material],
+        model: Model,
+        supports: Sequence[Displacement] = (),
+        loads: Sequence[Load] = (),
+        debonds: Sequence[Debond] = (),
+        bonds: Sequence[Interface] = (),
+        monitors: Sequence[Monitor] = (),
+        order: int | None = None,
+        options: CondensedOptions | None = None,
+    ) -> None:
+        interfaces = [d.interface for d in debonds] + list(bonds)
+        titles = [i.title for i in interfaces]
+        for title in titles:
+            if titles.count(title) > 1:
+                raise InputError(
+                    f"interface '{title}' appears twice; give one criterion per interface and "
+                    "different names to different interfaces"
+                )
+        self.mesh = mesh
+        self.debonds = list(debonds)
+        self.continuum = Continuum(mesh, materials, model, order=order)
+        self.pairs = [make_pair(self.continuum, i) for i in interfaces]
+        self.supports = collect_supports(self.continuum, list(supports))
+        self.loads = list(loads)
+        self.model = CondensedModel(
+            self.continuum,
+            self.pairs,
+            self.supports,
+            self.loads,
+            list(monitors),
+            options or CondensedOptions(),
+        )
+        self.growths: list[Growth] = []
+        self.time = 0.0
+        self._work = 0.0
+        self._released = 0.0
+        self.history = History(mesh.comm)
+        self._started = False
+
+    def loads_at(self, time: float) -> Array:
+        """Amplitudes of all supports and load factors at a time."""
+        values = [c.coordinate(time) for c in self.supports.columns]
+        return np.array(values + [load.amplitude(time) for load in self.loads])
+
+    def _breaks(self) -> tuple[float, ...]:
+        moving = [c.support.amplitude for c in self.supports.columns if c.moves]
+        every = moving + [load.amplitude for load in self.loads]
+        return tuple(sorted({b for a in every for b in a.breaks()}))
+
+    def run(
+        self,
+        step: Static,
+        *,
+        grow: Sequence[Debond] | None = None,
+        progress: bool = True,
+    ) -> History:
+        """Run a step and return the history of all steps so far; collective.
+
+        Args:
+            step: What to do and when to stop.
+            grow: Debonds that may grow in this step; all by default. The others stay tied.
+            progress: Show load, crack length and f while running (on a terminal only).
+        """
+        chosen = self.debonds if grow is None else list(grow)
+        for debond in chosen:
+            if debond not in self.debonds:
+                raise InputError(
+                    f"debond of interface '{debond.interface.title}' is not part of the scene"
+                )
+        active = [d in chosen for d in self.debonds]
+        active += [False] * (len(self.pairs) - len(self.debonds))
+        if not self._started:
+            self.growths = [Growth(self.model, p, d) for p, d in enumerate(self.debonds)]
+        growths = [g for g, on in zip(self.growths, active, strict=False) if on]
+        for g in growths:
+            if not len(g.tips()):
+                log.warn(
+                    "interface '%s' has no crack tip: its bonded set leaves no open node beside a "
+                    "bonded one, so nothing can debond",
+                    g.title,
+                )
+        self.model.prepare(active, self._reach(step))
+        if not self._started:
+            zero = np.zeros(self.model.system.n_window)
+            self.model.state = self.model.system.equilibrium(np.zeros(self.model.n_loads), zero)
+            at_start = self.loads_at(0.0)
+            if np.any(at_start):
+                self._jump_to(at_start)
+            self._started = True
+        with Progress(self.mesh.comm, enabled=progress) as show:
+            march = March(
+                self.model,
+                growths,
+                step,
+                self.history,
+                self.loads_at,
+                self._breaks(),
+                time=self.time,
+                work=self._work,
+                released=self._released,
+                observer=show,
+            )
+            self.history.reason = march.run()
+        self.time, self._work, self._released = march.time, march.work, march.released
+        self.history.details = {
+            "dofs": self.continuum.n_global,
+            "window": self.model.system.n_window,
+            "releases": sum(g.n_released for g in self.growths),
+            "factorizations": self.model.timings.factorizations,
+            "ranks": self.mesh.comm.size,
+            "contact_steps": self.model.system.contact_steps,
+            "seconds": dict(self.model.timings.seconds),
+        }
+        return self.history
+
+    def _jump_to(self, loads: Array) -> None:
+        """Apply loads that are there from the first moment."""
+        raise InputError(
+            f"loads are not zero at time 0 (amplitudes {loads}); let amplitudes start at 0"
+        )
+
+    def _reach(self, step: Static) -> list[float]:
+        """How far each crack may grow in a step, length."""
+        out = [np.inf] * len(self.pairs)
+        for end in step.ends:
+            if isinstance(end, CrackLength):
+                for g in self.growths:
+                    if self.pairs[g.p].interface is end.interface:
+                        ahead = end.length - g.extent.length(g.tips())
+                        size = self.pairs[g.p].surface.facet_size
+                        if self.mesh.gdim == 3:
+                            ahead *= 1.1
+                        out[g.p] = max(ahead, 0.0) + 2.5 * size
+        return out
+
+    def close(self) -> None:
+        """Free all PETSc objects; collective. The history stays."""
+        self.model.destroy()
+
+
+__all__ = ["Debond", "Scene"]

@@ -1,0 +1,1 @@
+"""solve layer of fxcrack; see the modules."""

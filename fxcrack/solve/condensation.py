@@ -1,0 +1,295 @@
+"""Condensation of the linear continuum onto window, support, force and monitor coordinates.
+
+    A = T^t K T, bordered by -T^t f for every force pattern f and by T^t l for every monitor l,
+    S = A_22 - A_21 A_11^-1 A_12   on x = (jumps, prescribed amplitudes, load factors, 0)
+
+S x then holds, row by row: interface forces; reactions (work-conjugate to the amplitudes);
+minus the work-conjugate displacements of the load patterns; monitored displacements.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import scipy.sparse as sp
+from petsc4py import PETSc
+
+from fxcrack.continuum import Continuum
+from fxcrack.errors import InputError, SolverError
+from fxcrack.interface.jumps import JumpCoordinates
+from fxcrack.loads import Load, Monitor
+from fxcrack.solve.petsc_schur import SchurFactor, library, mumps_message
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Timings:
+    """Seconds and counts of the phases of a run, the same meaning on every rank."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+    factorizations: int = 0
+
+    def add(self, phase: str, start: float) -> None:
+        """Add the time since ``start`` (of ``time.perf_counter``) to a phase."""
+        self.seconds[phase] = self.seconds.get(phase, 0.0) + time.perf_counter() - start
+
+
+def border_vectors(
+    continuum: Continuum, loads: list[Load], monitors: list[Monitor]
+) -> list[PETSc.Vec]:
+    """Force patterns with the minus sign, then monitors, as vectors on displacements."""
+    out = []
+    for load in loads:
+        vector = continuum.load_vector(load)
+        vector.scale(-1.0)
+        out.append(vector)
+    for monitor in monitors:
+        if len(monitor.direction) != continuum.gdim:
+            raise InputError(
+                f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
+                f"{continuum.gdim} are needed"
+            )
+        nodes = continuum.owned_nodes(monitor.where)
+        count = continuum.comm.allreduce(len(nodes))
+        vector = PETSc.Vec().createMPI(
+            (continuum.n_local, continuum.n_global), comm=continuum.comm
+        )
+        for i, component in enumerate(monitor.direction):
+            vector.array[continuum.gdim * nodes + i] = component / count
+        out.append(vector)
+    return out
+
+
+def bordered_matrix(
+    stiffness: PETSc.Mat, coordinates: JumpCoordinates, borders: list[PETSc.Vec]
+) -> PETSc.Mat:
+    """A with its borders; destroys nothing; collective."""
+    inner = stiffness.ptap(coordinates.transform)
+    if not borders:
+        return inner
+    comm = inner.getComm().tompi4py()
+    (n_rows, n_columns), _ = inner.getSizes()
+    indptr, indices, data = inner.getValuesCSR()
+    first = coordinates.first + coordinates.n_window + coordinates.n_supports
+    parts: list[Any] = [sp.csr_matrix((data, indices, indptr), shape=(n_rows, n_columns))]
+    start, _ = inner.getOwnershipRange()
+    right = inner.createVecRight()
+    for i, border in enumerate(borders):
+        coordinates.transform.multTranspose(border, right)
+        local = np.flatnonzero(right.array)
+        values = right.array[local]
+        parts.append(
+            sp.csr_matrix(
+                (values, (local, np.full(len(local), first + i))), shape=(n_rows, n_columns)
+            )
+        )
+        found = comm.gather((local + start, values))
+        if comm.rank == 0:
+            columns, entries = (np.concatenate(p) for p in zip(*found, strict=True))
+            # a stored diagonal, however small: without one the symmetric conversion goes wrong
+            columns = np.append(columns, first + i)
+            entries = np.append(entries, 1e-300)
+            row = np.full(len(columns), first + i)
+            parts.append(sp.csr_matrix((entries, (row, columns)), shape=(n_rows, n_columns)))
+    right.destroy()
+    inner.destroy()
+    total = parts[0]
+    for part in parts[1:]:
+        total = total + part
+    total.sort_indices()
+    matrix = PETSc.Mat().createAIJ(
+        ((n_rows, n_columns), (n_rows, n_columns)),
+        csr=(
+            total.indptr.astype(PETSc.IntType),
+            total.indices.astype(PETSc.IntType),
+            total.data,
+        ),
+        comm=stiffness.getComm(),
+    )
+    matrix.assemble()
+    return matrix
+
+
+class Condensation:
+    """S and the way back to displacements.
+
+    Args:
+        stiffness: K; stays with the caller.
+        coordinates: T and its numbering; owned by the condensation from now on.
+        borders: Force patterns and monitors from :func:`border_vectors`; stay with the caller.
+        timings: Where seconds and factorisations are counted.
+        method: "schur" takes S out of MUMPS, "columns" builds it by block solves, "auto" takes
+            the first where it can.
+
+    Attributes:
+        schur: S, shape (n_last, n_last), the same on every rank.
+    """
+
+    def __init__(
+        self,
+        stiffness: PETSc.Mat,
+        coordinates: JumpCoordinates,
+        borders: list[PETSc.Vec],
+        timings: Timings,
+        *,
+        method: str = "auto",
+    ) -> None:
+        if method not in ("auto", "schur", "columns"):
+            raise InputError(f"method = '{method}': choose 'auto', 'schur' or 'columns'")
+        self.coordinates = coordinates
+        self.timings = timings
+        self._comm = stiffness.getComm().tompi4py()
+        self._factor: SchurFactor | None = None
+        self._inner: PETSc.KSP | None = None
+        self._inner_matrix: PETSc.Mat | None = None
+        start = time.perf_counter()
+        self.matrix = bordered_matrix(stiffness, coordinates, borders)
+        timings.add("transform", start)
+        start = time.perf_counter()
+        if method == "schur" or (method == "auto" and library() is not None):
+            self._factor = SchurFactor(self.matrix, coordinates.n_last)
+            timings.factorizations += 1
+            self.schur = self._factor.schur
+        else:
+            self.schur = self._columns()
+        timings.add("factor_with_schur", start)
+        if not np.all(np.isfinite(self.schur)):
+            raise SolverError(mumps_message(-10, 0))
+
+    def _rows(self) -> tuple[PETSc.IS, PETSc.IS]:
+        """Index sets of the inner and of the last rows of this rank."""
+        start, _ = self.matrix.getOwnershipRange()
+        n_inner = self.coordinates.n_inner
+        n_last = self.coordinates.n_last if self._comm.rank == 0 else 0
+        inner = PETSc.IS().createStride(n_inner, start, 1, comm=self._comm)
+        return inner, PETSc.IS().createStride(n_last, start + n_inner, 1, comm=self._comm)
+
+    def _inner_solver(self) -> PETSc.KSP:
+        """An ordinary Cholesky factorisation of A_11, made on first use."""
+        if self._inner is None:
+            start = time.perf_counter()
+            inner, last = self._rows()
+            block = self.matrix.createSubMatrix(inner, inner)
+            block.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+            block.setOption(PETSc.Mat.Option.SPD, True)
+            solver = PETSc.KSP().create(self._comm)
+            solver.setOptionsPrefix("fxcrack_inner_")
+            solver.setOperators(block)
+            solver.setType(PETSc.KSP.Type.PREONLY)
+            solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
+            if PETSc.Sys.hasExternalPackage("mumps"):
+                solver.getPC().setFactorSolverType("mumps")
+            elif self._comm.size > 1:
+                solver.getPC().setType(PETSc.PC.Type.LU)
+                solver.getPC().setFactorSolverType("superlu_dist")
+            solver.setUp()
+            inner.destroy()
+            last.destroy()
+            self._inner, self._inner_matrix = solver, block
+            self.timings.factorizations += 1
+            self.timings.add("factor_inner", start)
+        return self._inner
+
+    def _columns(self, block_size: int = 64) -> Array:
+        """S by solves with blocks of right-hand sides: same result, slower."""
+        solver = self._inner_solver()
+        inner, last = self._rows()
+        coupling = self.matrix.createSubMatrix(inner, last)
+        corner = self.matrix.createSubMatrix(last, last)
+        n_last, n_inner = self.coordinates.n_last, self.coordinates.n_inner
+        factor = solver.getPC().getFactorMatrix()
+        total_inner = solver.getOperators()[0].getSize()[0]
+        out = np.zeros((n_last, n_last))
+        whole = corner.createVecLeft()
+        for begin in range(0, n_last, block_size):
+            width = min(block_size, n_last - begin)
+            right = PETSc.Mat().createDense(
+                ((n_inner, total_inner), (PETSc.DECIDE, width)), comm=self._comm
+            )
+            right.setUp()
+            solution = right.duplicate()
+            unit, column = coupling.createVecRight(), coupling.createVecLeft()
+            array = right.getDenseArray()
+            for j in range(width):
+                unit.set(0.0)
+                if self._comm.rank == 0:
+                    unit.array[begin + j] = 1.0
+                coupling.mult(unit, column)
+                array[:, j] = column.array
+            right.assemble()
+            solution.assemble()
+            factor.matSolve(right, solution)
+            x = solution.getDenseArray()
+            for j in range(width):
+                column.array[:] = x[:, j]
+                coupling.multTranspose(column, unit)
+                if self._comm.rank == 0:
+                    out[:, begin + j] = -unit.array
+                    whole.set(0.0)
+                unit.set(0.0)
+                if self._comm.rank == 0:
+                    unit.array[begin + j] = 1.0
+                corner.mult(unit, whole)
+                if self._comm.rank == 0:
+                    out[:, begin + j] += whole.array
+            for thing in (right, solution, unit, column):
+                thing.destroy()
+        for thing in (coupling, corner, whole, inner, last):
+            thing.destroy()
+        self._comm.Bcast(out)
+        return 0.5 * (out + out.T)
+
+    def displacement(self, last: Array) -> PETSc.Vec:
+        """Displacements for given last coordinates; collective, one back-solve.
+
+        Args:
+            last: x = (jumps, amplitudes, load factors, zeros), shape (n_last,).
+
+        Returns:
+            u on the displacement dofs; the caller destroys it.
+        """
+        start = time.perf_counter()
+        n_inner = self.coordinates.n_inner
+        q = self.matrix.createVecRight()
+        if self._comm.rank == 0:
+            q.array[n_inner:] = last
+        right = self.matrix.createVecLeft()
+        self.matrix.mult(q, right)
+        right.scale(-1.0)
+        if self._factor is not None and self._factor.solves:
+            right.array[n_inner:] = 0.0
+            solution = right.duplicate()
+            self._factor.solve_inner(right, solution)
+            q.array[:n_inner] = solution.array[:n_inner]
+            solution.destroy()
+        else:
+            solver = self._inner_solver()
+            inner = solver.getOperators()[0].createVecRight()
+            found = inner.duplicate()
+            inner.array[:] = right.array[:n_inner]
+            solver.solve(inner, found)
+            q.array[:n_inner] = found.array
+            inner.destroy()
+            found.destroy()
+        u = self.coordinates.transform.createVecLeft()
+        self.coordinates.transform.mult(q, u)
+        q.destroy()
+        right.destroy()
+        self.timings.add("fields", start)
+        return u
+
+    def destroy(self) -> None:
+        """Free matrices and factors; collective."""
+        if self._factor is not None:
+            self._factor.destroy()
+        if self._inner is not None:
+            self._inner.destroy()
+        if self._inner_matrix is not None:
+            self._inner_matrix.destroy()
+        self.matrix.destroy()
+        self.coordinates.transform.destroy()

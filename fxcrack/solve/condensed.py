@@ -1,0 +1,328 @@
+"""The linear continuum as its interfaces see it: one factorisation, then dense algebra.
+
+A :class:`CondensedModel` knows which nodes are bonded, open or in contact, gives equilibrium
+states for loads, bond forces and openings at the tips, and lets nodes go. It factors again only
+when the front leaves the window.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fxcrack import log
+from fxcrack.continuum import Continuum
+from fxcrack.interface.front import Front, Tips
+from fxcrack.interface.jumps import WINDOW, Supports, build_coordinates
+from fxcrack.interface.pairing import Pair
+from fxcrack.loads import Load, Monitor
+from fxcrack.solve.condensation import Condensation, Timings, border_vectors
+from fxcrack.solve.jump_system import Equilibrium, JumpSystem
+from fxcrack.solve.window import CostModel, choose_roles
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class CondensedOptions:
+    """How the condensation is done.
+
+    Args:
+        method: "auto", "schur" or "columns" (see :class:`Condensation`).
+        window_mb: Memory the dense matrices of the window may take, MB.
+        rows: Force the window to reach at most this distance ahead of the front (length);
+            ``None`` lets the cost model decide.
+    """
+
+    method: str = "auto"
+    window_mb: float = 2000.0
+    rows: float | None = None
+
+
+class CondensedModel:
+    """Bodies, interfaces and loads, condensed.
+
+    Args:
+        continuum: Elastic bodies.
+        pairs: Interfaces.
+        supports: Prescribed components.
+        loads: Force patterns.
+        monitors: Monitored displacements.
+        options: How to condense.
+
+    Attributes:
+        fronts: Fronts per pair.
+        system: The dense system of the present window.
+        state: Present equilibrium.
+        timings: Seconds per phase and number of factorisations.
+    """
+
+    def __init__(
+        self,
+        continuum: Continuum,
+        pairs: list[Pair],
+        supports: Supports,
+        loads: list[Load],
+        monitors: list[Monitor],
+        options: CondensedOptions,
+    ) -> None:
+        self.continuum = continuum
+        self.pairs = pairs
+        self.supports = supports
+        self.loads = loads
+        self.monitors = monitors
+        self.options = options
+        self.timings = Timings()
+        self.fronts = [Front(p.surface, p.bonded, p.title) for p in pairs]
+        self.n_loads = len(supports.columns) + len(loads)
+        self.active = [False] * len(pairs)
+        self.reach = [np.inf] * len(pairs)
+        self.rebases = 0
+        self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
+        self._stiffness: PETSc.Mat | None = None
+        self._borders: list[PETSc.Vec] = []
+        self._condensation: Condensation | None = None
+        self.system: JumpSystem
+        self.state: Equilibrium
+
+    # -- the window ------------------------------------------------------------------------------
+
+    def prepare(self, active: list[bool], reach: list[float]) -> None:
+        """Build the window for a step; collective.
+
+        Args:
+            active: Interfaces that may grow in the step.
+            reach: Distance the crack may grow per interface, inf if unknown.
+        """
+        self.active, self.reach = active, reach
+        self._rebase()
+        self.rebases = 0
+
+    def _rebase(self) -> None:
+        if self._stiffness is None:
+            start = time.perf_counter()
+            self.continuum.compile()
+            self.timings.add("compile", start)
+            start = time.perf_counter()
+            self._stiffness = self.continuum.stiffness()
+            self._borders = border_vectors(self.continuum, self.loads, self.monitors)
+            self.timings.add("assemble", start)
+        reach = self.reach
+        if self.options.rows is not None:
+            reach = [min(r, self.options.rows) for r in reach]
+        roles = choose_roles(
+            self.pairs,
+            self.fronts,
+            self.active,
+            reach,
+            self._cost,
+            cap_mb=self.options.window_mb,
+            gdim=self.continuum.gdim,
+        )
+        if self._condensation is not None:
+            self._condensation.destroy()
+        start = time.perf_counter()
+        coordinates = build_coordinates(
+            self.continuum, self.pairs, roles, self.supports, len(self._borders)
+        )
+        self.timings.add("transform", start)
+        start = time.perf_counter()
+        self._condensation = Condensation(
+            self._stiffness,
+            coordinates,
+            self._borders,
+            self.timings,
+            method=self.options.method,
+        )
+        seconds = self.continuum.comm.bcast(time.perf_counter() - start)
+        self._cost.observe(coordinates.n_window, seconds)
+        self.frames, self.index = coordinates.frames, coordinates.index
+        self.held_by_supports = coordinates.held
+        self.system = JumpSystem(
+            self._condensation.schur, coordinates.n_window, self.n_loads, len(self.loads)
+        )
+        start = time.perf_counter()
+        self._restore_states(roles)
+        self.timings.add("march", start)
+        log.info(
+            "factorisation %d: %d coordinates in the window",
+            self.timings.factorizations,
+            coordinates.n_window,
+        )
+
+    def _restore_states(self, roles: list[npt.NDArray[np.int8]]) -> None:
+        """Free what is open in the new window and mark what may touch."""
+        for pair, front, index in zip(self.pairs, self.fronts, self.index, strict=True):
+            is_open = ~front.bonded
+            self.system.gap[index[:, 0][index[:, 0] >= 0]] = pair.gap[index[:, 0] >= 0]
+            free = index[is_open]
+            free = free[free >= 0]
+            if len(free):
+                self.system.release(free)
+            if pair.interface.contact:
+                self._let_touch(pair, front, index)
+
+    def _let_touch(self, pair: Pair, front: Front, index: Ints) -> None:
+        normals = index[~front.bonded & pair.paired, 0]
+        self.system.contact[normals[normals >= 0]] = True
+
+    def require_tips(self, tips: list[Tips | None]) -> bool:
+        """Make sure the window holds all the tips need, factoring again if not; collective.
+
+        Returns:
+            Whether a new factorisation was made; the state then has to be solved for again.
+        """
+        for pair, index, held, tip in zip(
+            self.pairs, self.index, self.held_by_supports, tips, strict=True
+        ):
+            if tip is None or not len(tip):
+                continue
+            nodes = np.concatenate([tip.force_nodes.ravel(), tip.wake_nodes.ravel()])
+            missing = (index[nodes] < 0) & ~held[nodes]
+            if pair.interface.normal_only:
+                missing[:, 1:] = False
+            missing[~pair.paired[nodes]] = False
+            if missing.any():
+                self.rebases += 1
+                loads, force = self.state.loads, self.state.force
+                if force.any():
+                    raise RuntimeError("a rebase while forces ramp down must carry them over")
+                self._rebase()
+                self.state = self.system.equilibrium(loads, np.zeros(self.system.n_window))
+                return True
+        return False
+
+    # -- quantities at the tips --------------------------------------------------------------------
+
+    def vectors(self, p: int, nodes: Ints, values: Array) -> Array:
+        """Jump or force components at slave nodes as global vectors.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, shape (...,).
+            values: Values per window component, shape (n_window,).
+
+        Returns:
+            Shape (..., 3); zero where a component is outside the window.
+        """
+        index = self.index[p][nodes]
+        local = np.where(index >= 0, values[np.maximum(index, 0)], 0.0)
+        out = np.zeros((*index.shape[:-1], 3))
+        out[..., : self.continuum.gdim] = np.einsum(
+            "...ck,...k->...c", self.frames[p][nodes], local
+        )
+        return out
+
+    def bond_forces(self, p: int, tips: Tips, state: Equilibrium) -> Array:
+        """Tension-positive bond forces at the tips in the tip frames, shape (n, k, 3)."""
+        index = self.index[p][tips.force_nodes]
+        rows = np.unique(index[index >= 0])
+        values = np.zeros(self.system.n_window)
+        values[rows] = -self.system.forces(state, rows)
+        out = np.einsum("nci,nkc->nki", tips.frame, self.vectors(p, tips.force_nodes, values))
+        if tips.force_nodes.shape[1] > 1:
+            # at the end of a surface there is no midside node ahead
+            out[tips.force_nodes[:, 0] == tips.force_nodes[:, 1], 1] = 0.0
+        return np.asarray(out)
+
+    def openings(self, p: int, tips: Tips, state: Equilibrium) -> Array:
+        """Openings behind the tips in the tip frames, shape (n, k, 3), length."""
+        jump = self.vectors(p, tips.wake_nodes, state.jump)
+        jump = np.einsum("nkm,nkmc->nkc", tips.wake_weights, jump)
+        return np.asarray(np.einsum("nci,nkc->nki", tips.frame, jump))
+
+    def closure_jumps(self, p: int, tips: Tips, force: Array) -> Array:
+        """Jumps that letting each unit go alone would open, shape (n, k, 3), length.
+
+        Args:
+            p: Number of the pair.
+            tips: Front nodes.
+            force: Their bond forces in tip frames, shape (n, k, 3).
+        """
+        out = np.zeros_like(force)
+        gdim = self.continuum.gdim
+        for i in range(len(tips)):
+            nodes = np.unique(tips.force_nodes[i])
+            index = self.index[p][nodes]
+            slot = index >= 0
+            _, star = self.system.cholesky.reduced(index[slot])
+            vector = np.einsum("ci,ki->kc", tips.frame[i], force[i, : len(nodes)])
+            order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
+            local = np.einsum("kci,kc->ki", self.frames[p][nodes[order]], vector[:, :gdim])
+            right = np.zeros((len(nodes), gdim))
+            right[order] = local
+            jump = np.zeros((len(nodes), gdim))
+            jump[slot] = np.linalg.solve(star, right[slot])
+            jump = jump[order]
+            world = np.zeros((len(nodes), 3))
+            world[:, :gdim] = np.einsum("kci,ki->kc", self.frames[p][nodes[order]], jump)
+            out[i, : len(nodes)] = world @ tips.frame[i]
+        return out
+
+    # -- letting go ----------------------------------------------------------------------------------
+
+    def components(self, p: int, nodes: Ints) -> Ints:
+        """Window components of slave nodes."""
+        index = self.index[p][nodes]
+        return index[index >= 0]
+
+    def release(self, p: int, nodes: Ints) -> float:
+        """Let nodes go at constant load and find the new equilibrium.
+
+        Returns:
+            Energy set free by the bond forces on their way to zero.
+
+        Raises:
+            NotPositiveDefinite: A body would come free; nothing is changed.
+        """
+        system, before = self.system, self.state
+        components = self.components(p, nodes)
+        components = components[~system.free[components]]
+        forces = system.forces(before, components)
+        system.release(components)
+        self.fronts[p].release(nodes)
+        if self.pairs[p].interface.contact:
+            self._let_touch(self.pairs[p], self.fronts[p], self.index[p])
+        held = before.force.copy()
+        held[components] = forces
+        start = Equilibrium(before.loads, held, before.jump, before.conjugate)
+        released = 0.0
+        last, last_force = start, forces
+        for _, point in system.pieces(start, before.loads, before.force):
+            now = point.force[components]
+            opened = point.jump[components] - last.jump[components]
+            released -= 0.5 * float((now + last_force) @ opened)
+            last, last_force = point, now
+        self.state = last
+        return released
+
+    # -- the way back to fields ------------------------------------------------------------------------
+
+    def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Displacement vector of a state; collective; the caller destroys it."""
+        state = self.state if state is None else state
+        assert self._condensation is not None
+        last = np.zeros(len(self.system.schur))
+        last[: self.system.n_window] = state.jump
+        last[self.system.n_window : self.system.n_window + self.n_loads] = state.loads
+        return self._condensation.displacement(last)
+
+    def destroy(self) -> None:
+        """Free all PETSc objects; collective."""
+        if self._condensation is not None:
+            self._condensation.destroy()
+            self._condensation = None
+        for vector in self._borders:
+            vector.destroy()
+        if self._stiffness is not None:
+            self._stiffness.destroy()
+            self._stiffness = None
+        self._borders = []
+
+
+__all__ = ["WINDOW", "CondensedModel", "CondensedOptions"]

@@ -1,0 +1,305 @@
+"""The interface alone: dense equilibrium of the window on S, with unilateral contact.
+
+Every window component is either held (its jump is known, its force follows) or free (its force is
+known, its jump follows):
+
+    S_ff delta_f = p_f - S_fL a - S_fh delta_h,       p_h = S_hf delta_f + S_hh delta_h + S_hL a
+
+a are the prescribed amplitudes and load factors. Contact holds normal components at -gap while
+they press (p_n >= 0) and frees them while they gape (delta_n >= -gap).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve
+from scipy.optimize import nnls
+
+from fxcrack.errors import ConvergenceError
+from fxcrack.solve.cholesky import GrowingCholesky
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
+
+_ROUND_OFF = 1e-11
+"""Gaps and pressures below this fraction of the largest one count as zero."""
+
+
+@dataclass(frozen=True)
+class Equilibrium:
+    """One equilibrium state of the interface.
+
+    Attributes:
+        loads: Amplitudes of supports and load factors, shape (n_loads,).
+        force: Given forces on free components, 0 elsewhere, shape (n_window,).
+        jump: Jumps, shape (n_window,), length.
+        conjugate: Reactions of supports and displacements of load patterns, shape (n_loads,).
+    """
+
+    loads: Array
+    force: Array
+    jump: Array
+    conjugate: Array
+
+
+class JumpSystem:
+    """States of the window components and the equilibrium they lead to.
+
+    Args:
+        schur: S over (window, supports, force patterns, monitors).
+        n_window: Number of window components.
+        n_loads: Number of supports and force patterns together.
+        n_forces: How many of these are force patterns (the last ones).
+
+    Attributes:
+        free: Components whose force is known, shape (n_window,).
+        closed: Normal components held by contact, shape (n_window,).
+        contact: Normal components that may be in contact now, shape (n_window,).
+        gap: Initial gaps, shape (n_window,), length.
+        contact_steps: Number of active-set steps done.
+    """
+
+    def __init__(self, schur: Array, n_window: int, n_loads: int, n_forces: int) -> None:
+        self.schur = schur
+        self.n_window = n_window
+        self.load_columns = np.arange(n_window, n_window + n_loads)
+        self.monitor_rows = np.arange(n_window + n_loads, len(schur))
+        self.sign = np.ones(n_loads)
+        self.sign[n_loads - n_forces :] = -1.0
+        self.free = np.zeros(n_window, dtype=bool)
+        self.closed = np.zeros(n_window, dtype=bool)
+        self.contact = np.zeros(n_window, dtype=bool)
+        self.gap = np.zeros(n_window)
+        self.contact_steps = 0
+        self.cholesky = GrowingCholesky(schur)
+        self._forward = np.zeros((0, n_loads))
+        self._unit: Array | None = None
+
+    # -- states --------------------------------------------------------------------------------
+
+    def release(self, components: Ints) -> None:
+        """Free components; their forces are given from now on.
+
+        Raises:
+            NotPositiveDefinite: Nothing restrains one of them any more; nothing is changed.
+        """
+        new = np.asarray(components)[~self.free[components]]
+        if not len(new):
+            return
+        left = self.cholesky.append(new)
+        n, k = left.shape[1], len(new)
+        right = self.schur[np.ix_(new, self.load_columns)] - left @ self._forward
+        tile = self.cholesky._rows[n : n + k, n : n + k]
+        self._forward = np.vstack([self._forward, np.linalg.solve(tile, right)])
+        self.free[new] = True
+        self._unit = None
+
+    def hold(self, components: Ints) -> None:
+        """Hold components again (contact)."""
+        self.cholesky.remove(components)
+        self.free[components] = False
+        self._forward = self.cholesky.forward(
+            self.schur[np.ix_(self.cholesky.free, self.load_columns)]
+        )
+        self._unit = None
+
+    # -- equilibrium with given states -----------------------------------------------------------
+
+    def _response(self) -> Array:
+        """Jumps of the free components per unit load, shape (n_free, n_loads)."""
+        if self._unit is None:
+            self._unit = -self.cholesky.backward(self._forward)
+        return self._unit
+
+    def linear(self, loads: Array, force: Array) -> Equilibrium:
+        """Equilibrium with the states as they are, contact conditions unchecked."""
+        free = self.cholesky.free
+        jump = np.where(self.closed, -self.gap, 0.0)
+        part = self._response() @ loads
+        right = force[free]
+        held = np.flatnonzero(jump)
+        if len(held):
+            right = right - self.schur[np.ix_(free, held)] @ jump[held]
+        if np.any(right):
+            part = part + self.cholesky.solve(right)
+        jump[free] = part
+        columns = self.load_columns
+        active = np.concatenate([free, held])
+        conjugate = self.schur[np.ix_(columns, active)] @ jump[active]
+        conjugate += self.schur[np.ix_(columns, columns)] @ loads
+        return Equilibrium(loads, force, jump, self.sign * conjugate)
+
+    def forces(self, state: Equilibrium, rows: Ints) -> Array:
+        """Interface forces on the slave side at some components, shape (len(rows),)."""
+        active = np.flatnonzero(state.jump)
+        out = self.schur[np.ix_(rows, active)] @ state.jump[active]
+        return np.asarray(out + self.schur[np.ix_(rows, self.load_columns)] @ state.loads)
+
+    def monitors(self, state: Equilibrium) -> Array:
+        """Monitored displacements, shape (n_monitors,)."""
+        x = np.concatenate([state.jump, state.loads])
+        return np.asarray(self.schur[self.monitor_rows, : len(x)] @ x)
+
+    def strain_energy(self, state: Equilibrium) -> float:
+        """1/2 u^t K u, as half the work of all forces on their displacements."""
+        rows = np.flatnonzero((state.jump != 0.0) & (self.closed | (state.force != 0.0)))
+        interface = state.jump[rows] @ self.forces(state, rows) if len(rows) else 0.0
+        return 0.5 * float(interface + state.loads @ state.conjugate)
+
+    # -- contact -----------------------------------------------------------------------------------
+
+    def _violations(self, state: Equilibrium) -> tuple[Bools, Array, Array]:
+        """Contact components on the wrong side; gaps; pressures of the closed ones."""
+        gap = np.where(self.contact, state.jump + self.gap, 0.0)
+        pressure = np.zeros(self.n_window)
+        rows = np.flatnonzero(self.closed)
+        if len(rows):
+            pressure[rows] = self.forces(state, rows)
+        small_gap = _ROUND_OFF * np.abs(state.jump).max(initial=0.0)
+        small_force = _ROUND_OFF * np.abs(pressure).max(initial=0.0)
+        wrong = self.closed & (pressure < -small_force)
+        wrong |= self.contact & ~self.closed & (gap < -small_gap)
+        return wrong, gap, pressure
+
+    def _switch(self, components: Ints) -> None:
+        """Close the open ones among the components and open the closed ones."""
+        opening = components[self.closed[components]]
+        closing = components[~self.closed[components]]
+        self.closed[opening], self.closed[closing] = False, True
+        if len(closing):
+            self.hold(closing)
+        if len(opening):
+            self.release(opening)
+
+    def _set_closed(self, closed: Bools) -> None:
+        self._switch(np.flatnonzero(closed != self.closed))
+
+    def equilibrium(self, loads: Array, force: Array) -> Equilibrium:
+        """Equilibrium with contact: primal-dual active set from the present one.
+
+        A repeated set ends the active-set iteration; a non-negative least-squares problem with
+        the same solution, whose solver terminates, takes over.
+
+        Raises:
+            ConvergenceError: Neither gives a solution.
+        """
+        state = self.linear(loads, force)
+        if not self.contact.any():
+            return state
+        seen: set[bytes] = set()
+        for _ in range(100):
+            wrong, _, _ = self._violations(state)
+            if not wrong.any():
+                return state
+            key = np.packbits(self.closed).tobytes()
+            if key in seen:
+                break
+            seen.add(key)
+            self.contact_steps += 1
+            self._switch(np.flatnonzero(wrong))
+            state = self.linear(loads, force)
+        self._set_closed(self._least_squares(loads, force))
+        state = self.linear(loads, force)
+        wrong, gap, pressure = self._violations(state)
+        if wrong.any() and max(-gap.min(), 0.0) > 1e-7 * np.abs(state.jump).max():
+            raise ConvergenceError(
+                f"contact: {int(wrong.sum())} of {int(self.contact.sum())} nodes keep changing "
+                f"between open and closed (penetration {-gap.min():.2e}, "
+                f"tension {-pressure.min():.2e})"
+            )
+        return state
+
+    def _least_squares(self, loads: Array, force: Array) -> Bools:
+        """Closed set by the dual problem min 1/2 p^t C p + g^t p, p >= 0, as a NNLS problem."""
+        normal = np.flatnonzero(self.contact)
+        every = np.union1d(self.cholesky.free, normal)
+        factor = cho_factor(self.schur[np.ix_(every, every)], lower=True)
+        where = np.searchsorted(every, normal)
+        right = force[every] - self.schur[np.ix_(every, self.load_columns)] @ loads
+        gap = cho_solve(factor, right)[where] + self.gap[normal]
+        unit = np.zeros((len(every), len(normal)))
+        unit[where, np.arange(len(normal))] = 1.0
+        compliance = cho_solve(factor, unit)[where]
+        scale = 1.0 / np.sqrt(np.diagonal(compliance))
+        lower = np.linalg.cholesky(compliance * scale[:, None] * scale)
+        target = np.linalg.solve(lower, -gap * scale)
+        pressure, _ = nnls(lower.T, target, maxiter=50 * len(normal))
+        closed = np.zeros(self.n_window, dtype=bool)
+        closed[normal[pressure > 0.0]] = True
+        return closed
+
+    def pieces(
+        self, start: Equilibrium, loads: Array, force: Array
+    ) -> Iterator[tuple[float, Equilibrium]]:
+        """Follow contact from one equilibrium to other loads and forces, both changing linearly.
+
+        Args:
+            start: Equilibrium the present states belong to.
+            loads: Loads at the end, shape (n_loads,).
+            force: Given forces at the end, shape (n_window,).
+
+        Yields:
+            (fraction of the way, equilibrium there) at every change of contact and at the end;
+            between two of them everything is linear. The states change only when the next piece
+            is asked for, so a caller may stop in the middle of a piece.
+        """
+        here, last = 0.0, start
+        stuck = done = 0
+        while True:
+            end = self.linear(loads, force)
+            if not self.contact.any():
+                yield 1.0, end
+                return
+            wrong, gap, pressure = self._violations(end)
+            if not wrong.any():
+                yield 1.0, end
+                return
+            fraction = self._first_change(last, wrong, gap, pressure)
+            step = float(fraction.min())
+            changing = np.flatnonzero(fraction <= step + 1e-12)
+            stuck = stuck + 1 if step < 1e-12 else 0
+            done += 1
+            if stuck > 3 or done > 4 * self.n_window + 20:
+                # degenerate: several nodes change at once; the active set finds the end
+                yield 1.0, self.equilibrium(loads, force)
+                return
+            at = here + step * (1.0 - here)
+            point = blend(last, end, step)
+            if step > 0.0:
+                yield at, point
+            self.contact_steps += 1
+            self._switch(changing)
+            here, last = at, point
+
+    def _first_change(
+        self, last: Equilibrium, wrong: Bools, gap: Array, pressure: Array
+    ) -> Array:
+        """Fraction of the step at which each wrong component changes, inf elsewhere."""
+        out = np.full(self.n_window, np.inf)
+        for c in np.flatnonzero(wrong):
+            if self.closed[c]:
+                before, after = self.forces(last, np.array([c]))[0], pressure[c]
+            else:
+                before, after = last.jump[c] + self.gap[c], gap[c]
+            before = max(before, 0.0)
+            out[c] = before / (before - after)
+        return out
+
+
+def blend(a: Equilibrium, b: Equilibrium, x: float) -> Equilibrium:
+    """Linear interpolation between two equilibria of the same states."""
+    fields = ("loads", "force", "jump", "conjugate")
+    return Equilibrium(*[(1.0 - x) * getattr(a, k) + x * getattr(b, k) for k in fields])
+
+
+def work_between(a: Equilibrium, b: Equilibrium, n_forces: int) -> float:
+    """External work along a linear piece: supports move, force patterns are followed."""
+    n = len(a.loads) - n_forces
+    by_supports = 0.5 * (a.conjugate + b.conjugate)[:n] @ (b.loads - a.loads)[:n]
+    by_forces = 0.5 * (a.loads + b.loads)[n:] @ (b.conjugate - a.conjugate)[n:]
+    return float(by_supports + by_forces)

@@ -1,0 +1,159 @@
+"""The Schur complement of the last rows of rank 0 out of a MUMPS factorisation.
+
+    S = A_22 - A_21 A_11^-1 A_12
+
+petsc4py wraps none of the calls needed, so they are made through ctypes on the very library
+petsc4py is linked against. MUMPS fills one triangle of S, the lower on one rank and the upper on
+several; the other is mirrored here. PETSc wants all Schur rows on rank 0.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fxcrack.errors import SolverError
+
+Array = npt.NDArray[np.float64]
+
+_FACTOR_CHOLESKY = 2
+_ICNTL_ERROR_ANALYSIS, _ICNTL_MEMORY, _ICNTL_REDUCED = 11, 14, 26
+
+
+def library() -> ctypes.CDLL | None:
+    """PETSc's C interface, ``None`` where it or MUMPS cannot be reached."""
+    if not PETSc.Sys.hasExternalPackage("mumps"):
+        return None
+    try:
+        lib = ctypes.CDLL(PETSc.__file__)
+        lib.MatFactorSetSchurIS  # noqa: B018 - looks the symbol up
+    except (OSError, AttributeError):
+        return None
+    return lib
+
+
+def _handle(thing: Any) -> ctypes.c_void_p:
+    return ctypes.c_void_p(thing.handle)
+
+
+class SchurFactor:
+    """Cholesky factor of A_11 together with the dense S; collective.
+
+    Args:
+        matrix: Symmetric AIJ matrix whose leading block is positive definite, with an explicit
+            diagonal. Its last ``n_last`` rows on rank 0 are the Schur rows.
+        n_last: Number of Schur rows; at least 1.
+
+    Attributes:
+        schur: S, shape (n_last, n_last), the same array on every rank.
+
+    Raises:
+        SolverError: MUMPS failed; the message says why.
+    """
+
+    def __init__(self, matrix: PETSc.Mat, n_last: int) -> None:
+        lib = library()
+        if lib is None:
+            raise SolverError(
+                "PETSc's C interface with MUMPS cannot be reached; "
+                "use the column method (method='columns')"
+            )
+        self._lib = lib
+        self._comm = matrix.getComm().tompi4py()
+        matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        _, end = matrix.getOwnershipRange()
+        mine = np.arange(end - n_last, end) if self._comm.rank == 0 else np.zeros(0)
+        rows = PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
+        self._factor = ctypes.c_void_p()
+        self._call(
+            "MatGetFactor", _handle(matrix), b"mumps", _FACTOR_CHOLESKY, ctypes.byref(self._factor)
+        )
+        self._call("MatFactorSetSchurIS", self._factor, _handle(rows))
+        self._call("MatMumpsSetIcntl", self._factor, _ICNTL_MEMORY, 40)
+        self._call("MatCholeskyFactorSymbolic", self._factor, _handle(matrix), None, None)
+        self._call("MatCholeskyFactorNumeric", self._factor, _handle(matrix), None)
+        rows.destroy()
+        self._check()
+        self.schur = self._fetch(n_last)
+
+    def _call(self, name: str, *arguments: Any) -> None:
+        code = getattr(self._lib, name)(*arguments)
+        if code:
+            raise SolverError(f"PETSc's {name} returned error code {code}")
+
+    def _check(self) -> None:
+        value = ctypes.c_int()
+        self._call("MatMumpsGetInfog", self._factor, 1, ctypes.byref(value))
+        if value.value < 0:
+            detail = ctypes.c_int()
+            self._call("MatMumpsGetInfog", self._factor, 2, ctypes.byref(detail))
+            self.destroy()
+            raise SolverError(mumps_message(value.value, detail.value))
+
+    def _fetch(self, n_last: int) -> Array:
+        dense, status = ctypes.c_void_p(), ctypes.c_int()
+        self._call(
+            "MatFactorGetSchurComplement", self._factor, ctypes.byref(dense), ctypes.byref(status)
+        )
+        out = np.empty((n_last, n_last))
+        if self._comm.rank == 0:
+            data = ctypes.POINTER(ctypes.c_double)()
+            self._call("MatDenseGetArrayRead", dense, ctypes.byref(data))
+            raw = np.ctypeslib.as_array(data, (n_last, n_last)).T
+            # the other triangle may hold remains of the elimination: take the fuller one
+            lower = np.count_nonzero(raw[1:, 0]) + np.count_nonzero(raw[-1, :-1])
+            upper = np.count_nonzero(raw[0, 1:]) + np.count_nonzero(raw[:-1, -1])
+            np.copyto(out, raw if lower >= upper else raw.T)
+            mirror_lower(out)
+            self._call("MatDenseRestoreArrayRead", dense, ctypes.byref(data))
+        self._call("MatFactorRestoreSchurComplement", self._factor, ctypes.byref(dense), status)
+        self._comm.Bcast(out)
+        return out
+
+    @property
+    def solves(self) -> bool:
+        """Whether the factor itself can solve: PETSc allows it on one rank only."""
+        return bool(self._comm.size == 1)
+
+    def solve_inner(self, right: PETSc.Vec, solution: PETSc.Vec) -> None:
+        """Solve A_11 x_1 = b_1; the last entries of ``right`` must be zero. One rank only."""
+        self._call("MatMumpsSetIcntl", self._factor, _ICNTL_REDUCED, 0)
+        self._call("MatSolve", self._factor, _handle(right), _handle(solution))
+
+    def memory_mb(self) -> float:
+        """Memory MUMPS used on all ranks for the factorisation, MB."""
+        value = ctypes.c_int()
+        self._call("MatMumpsGetInfog", self._factor, 22, ctypes.byref(value))
+        return float(value.value)
+
+    def destroy(self) -> None:
+        """Free the factor; collective."""
+        if self._factor:
+            self._call("MatDestroy", ctypes.byref(self._factor))
+            self._factor = ctypes.c_void_p()
+
+
+def mirror_lower(square: Array) -> None:
+    """Copy the lower triangle onto the upper one, in place, block by block."""
+    n, step = len(square), 256
+    for i in range(0, n, step):
+        block = square[i : i + step, i : i + step]
+        block[:] = np.tril(block) + np.tril(block, -1).T
+        square[i : i + step, i + step :] = square[i + step :, i : i + step].T
+
+
+def mumps_message(code: int, detail: int) -> str:
+    """What a negative INFOG(1) of MUMPS means, in words."""
+    if code in (-10, -40):
+        return (
+            "the stiffness matrix is singular: some body or part of one can still move freely; "
+            "hold it by supports, or bond it to something held"
+        )
+    if code in (-9, -8, -7, -13, -11, -14, -15, -17, -20):
+        return f"MUMPS ran out of memory (INFOG(1) = {code}, INFOG(2) = {detail})"
+    return f"MUMPS failed with INFOG(1) = {code}, INFOG(2) = {detail}"

@@ -1,0 +1,153 @@
+"""Which jump components take part in the condensation, and when to factor again.
+
+Ahead of the front the window holds the bonded nodes the crack may reach before the next rebase;
+behind it, the wake the criterion looks at; with contact, all open normals. How far it reaches is
+the number of rows k that makes  (L/k) (t_plain + c n(k)^2)  smallest: L rows to go, n window
+components, c the cost of an entry of S, refitted from the last factorisation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from fxcrack.errors import InputError
+from fxcrack.interface.front import Front
+from fxcrack.interface.jumps import HELD, INNER, WINDOW
+from fxcrack.interface.pairing import Pair
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+WAKE_ROWS = 2
+"""Rows of open nodes behind the front that stay in the window."""
+
+
+@dataclass
+class CostModel:
+    """Seconds of a factorisation with n window components: t_plain + c n^2.
+
+    The constants start from measurements on one core (2-D: 211,332 dofs, 3-D: 126,630 dofs) and
+    are refitted by :meth:`observe`.
+
+    Attributes:
+        plain: Seconds of the plain factorisation.
+        per_entry: Seconds per entry of S.
+    """
+
+    plain: float
+    per_entry: float
+
+    @classmethod
+    def guess(cls, n_dofs: int, gdim: int) -> CostModel:
+        """Constants before anything was measured."""
+        if gdim == 2:
+            return cls(plain=6e-6 * n_dofs, per_entry=1e-7)
+        return cls(plain=1.2e-9 * float(n_dofs) ** (5.0 / 3.0) * 17.0 / 10.0, per_entry=1e-6)
+
+    def observe(self, n_window: int, seconds: float) -> None:
+        """Scale both constants so that they give the measured time."""
+        ratio = seconds / (self.plain + self.per_entry * n_window**2)
+        self.plain *= ratio
+        self.per_entry *= ratio
+
+    def reach(self, counts: npt.NDArray[np.int64]) -> int:
+        """Best number of candidate nodes to take.
+
+        Args:
+            counts: Cumulative number of window components after each candidate node,
+                nearest first, shape (n_candidates,).
+
+        Returns:
+            How many candidates, at least 1 if there is one.
+        """
+        if not len(counts):
+            return 0
+        share = np.arange(1, len(counts) + 1) / len(counts)
+        seconds = (self.plain + self.per_entry * counts.astype(float) ** 2) / share
+        return int(np.argmin(seconds)) + 1
+
+
+def choose_roles(
+    pairs: list[Pair],
+    fronts: list[Front],
+    active: list[bool],
+    reach: list[float],
+    cost: CostModel,
+    *,
+    cap_mb: float,
+    gdim: int,
+) -> list[npt.NDArray[np.int8]]:
+    """Roles of all jump components for the next factorisation.
+
+    Args:
+        pairs: Interfaces.
+        fronts: Their present fronts.
+        active: Whether the crack may grow in each.
+        reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
+        cost: Cost model.
+        cap_mb: Memory S may take, MB.
+        gdim: Dimension.
+
+    Raises:
+        InputError: Even the smallest useful window exceeds the cap.
+    """
+    roles, waiting = [], []
+    n_fixed = 0
+    for p, (pair, front, on, far) in enumerate(zip(pairs, fronts, active, reach, strict=True)):
+        role = np.full((pair.surface.n_nodes, gdim), INNER, dtype=np.int8)
+        bonded = front.bonded & pair.paired
+        role[bonded, 0] = HELD
+        if not pair.interface.normal_only:
+            role[bonded] = HELD
+        is_open = ~front.bonded & pair.paired
+        if pair.interface.contact:
+            role[is_open, 0] = WINDOW
+        if on and is_open.any() and bonded.any():
+            x = pair.surface.x
+            tips = front.candidates()
+            wake = _rings(front, tips, WAKE_ROWS * front.surface.order)
+            role[wake & is_open] = WINDOW
+            distance, _ = cKDTree(x[tips] if len(tips) else x[is_open]).query(x)
+            near = _rings(front, tips, 2 * front.surface.order) & bonded
+            role[near] = _window_of(pair, role[near])
+            rest = np.flatnonzero(bonded & ~near & (distance <= far))
+            rest = rest[np.lexsort((rest, distance[rest]))]
+            waiting += [(float(distance[i]), p, int(i)) for i in rest]
+        roles.append(role)
+        n_fixed += int((role == WINDOW).sum())
+    waiting.sort()
+    per_node = [1 if pair.interface.normal_only else gdim for pair in pairs]
+    counts = n_fixed + np.cumsum([per_node[p] for _, p, _ in waiting], dtype=np.int64)
+    most = int(np.sqrt(cap_mb * 1e6 / 8.0 / 2.0))
+    if n_fixed > most:
+        raise InputError(
+            f"the window needs {n_fixed} jump components at least, whose dense matrices exceed "
+            f"the cap of {cap_mb:.0f} MB; raise window_mb, or coarsen the interface"
+        )
+    fits = counts[counts <= most]
+    for _, p, i in waiting[: min(cost.reach(counts), len(fits))]:
+        roles[p][i] = _window_of(pairs[p], roles[p][i])
+    return roles
+
+
+def _window_of(pair: Pair, role: npt.NDArray[np.int8]) -> npt.NDArray[np.int8]:
+    """Roles of bonded nodes once they are in the window."""
+    out = np.full_like(role, WINDOW)
+    if pair.interface.normal_only:
+        out[..., 1:] = INNER
+    return out
+
+
+def _rings(front: Front, start: npt.NDArray[np.int64], n: int) -> Bools:
+    """Nodes at most n facets away from the start nodes."""
+    inside = np.zeros(front.surface.n_nodes, dtype=bool)
+    inside[start] = True
+    facets = front.surface.facets
+    for _ in range(n):
+        touched = inside[facets].any(axis=1)
+        inside[facets[touched].ravel()] = True
+    return inside

@@ -1,0 +1,397 @@
+"""Marching a quasi-static step: load, find where f = 1, let go, find the new equilibrium.
+
+Energy is accounted for piece by piece: work of supports and force patterns by the trapezoidal
+rule (exact, everything is linear in between), released energy by the bond forces on their way
+to zero; their balance with the strain energy is a check on all of it.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack import log
+from fxcrack.errors import InputError
+from fxcrack.output.history import History, Row
+from fxcrack.solve.cholesky import NotPositiveDefinite
+from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.jump_system import Equilibrium, blend, work_between
+from fxcrack.steps.growth import Growth, TipValues
+from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
+from fxcrack.steps.static import Static
+from fxcrack.steps.until import CrackLength, Releases, Time
+
+Array = npt.NDArray[np.float64]
+Observer = Callable[[str, Row], None]
+
+_LARGE = 1e60
+
+
+class March:
+    """One quasi-static step on a condensed model.
+
+    Args:
+        model: Model with its present state; prepared for the step.
+        growths: Activated debonds.
+        step: Controls.
+        history: Where rows go.
+        loads_at: Amplitudes and load factors at a time, shape (n_loads,).
+        breaks: Times at which an amplitude changes its slope.
+        time: Present time.
+        observer: Called with the event's name and the row after every event.
+    """
+
+    def __init__(
+        self,
+        model: CondensedModel,
+        growths: list[Growth],
+        step: Static,
+        history: History,
+        loads_at: Callable[[float], Array],
+        breaks: tuple[float, ...],
+        *,
+        time: float = 0.0,
+        work: float = 0.0,
+        released: float = 0.0,
+        observer: Observer | None = None,
+    ) -> None:
+        self.model = model
+        self.growths = growths
+        self.step = step
+        self.history = history
+        self.loads_at = loads_at
+        self.breaks = breaks
+        self.time = time
+        self.work = work
+        self.released = released
+        self._observer = observer
+        self._names = self._column_names()
+        self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=_LARGE)
+        self._values: list[TipValues] = []
+
+    # -- the three ways to step --------------------------------------------------------------------
+
+    def run(self) -> str:
+        """March until an end condition holds; returns why the step ended."""
+        start = clock.perf_counter()
+        before = {k: v for k, v in self.model.timings.seconds.items() if k.startswith("factor")}
+        self._look()
+        self._record("start")
+        try:
+            if self.step.stepping == "increment":
+                reason = self._run_increments()
+            elif self.step.stepping == "path":
+                reason = self._run_path()
+            else:
+                reason = self._run_events()
+        except NotPositiveDefinite as error:
+            reason = self._separated(error)
+        except TooManyCutbacks as error:
+            reason = f"stopped: {error}"
+            log.warn("%s", reason)
+        self._record("end")
+        after = {k: v for k, v in self.model.timings.seconds.items() if k.startswith("factor")}
+        inside = sum(after.values()) - sum(before.values())
+        self.model.timings.add("march", start + inside)
+        return reason
+
+    def _run_events(self) -> str:
+        while True:
+            reason = self._ended()
+            if reason:
+                return reason
+            if max(self._largest()) >= 1.0 - 1e-9:
+                self._record("onset")
+                self._let_go()
+                continue
+            if not self._load_to_event():
+                reason = self._ended()
+                return reason or "the criterion is not reached however large the load becomes"
+
+    def _run_path(self) -> str:
+        if self.breaks:
+            raise InputError(
+                "stepping='path' follows one proportional load; use the default amplitude for "
+                "all loads of the step"
+            )
+        while True:
+            reason = self._ended()
+            if reason:
+                return reason
+            if max(self._largest()) > 1.0 + 1e-9:
+                self._unload_to_event()
+            elif max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
+                return self._ended() or "the criterion is not reached however large the load is"
+            self._record("onset")
+            self._let_go()
+
+    def _run_increments(self) -> str:
+        control = IncrementControl(self.step)
+        while True:
+            reason = self._ended()
+            if reason:
+                return reason
+            target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
+            states = self.model.system.closed.copy()
+            pieces = list(self._pieces(target))
+            self._follow(pieces, target)
+            values = self._evaluate()
+            excess = [
+                v.f.max(initial=0.0) - self._upper(g)
+                for g, v in zip(self.growths, values, strict=True)
+            ]
+            if max(excess, default=-1.0) > 1e-12:
+                used = target - self._undo(states)
+                control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
+                continue
+            self._values = values
+            self._record("increment")
+            control.accepted()
+            while max(self._largest()) >= 1.0 and not self._ended():
+                unstable = max(self._largest())
+                self._let_go(all_ready=True)
+                if max(self._largest()) < 1.0 or not self._may_run_on(unstable):
+                    break
+
+    # -- moving along the load ------------------------------------------------------------------------
+
+    def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
+        self._undo_state = (self.time, self.model.state, self.work)
+        return list(
+            self.model.system.pieces(
+                self.model.state, self.loads_at(target), np.zeros(self.model.system.n_window)
+            )
+        )
+
+    def _follow(self, pieces: list[tuple[float, Equilibrium]], target: float) -> None:
+        n_forces = len(self.model.loads)
+        for _, point in pieces:
+            self.work += work_between(self.model.state, point, n_forces)
+            self.model.state = point
+        self.time = target
+
+    def _undo(self, closed: npt.NDArray[np.bool_]) -> float:
+        self.time, self.model.state, self.work = self._undo_state
+        self.model.system._set_closed(closed)
+        return self.time
+
+    def _breaks_ahead(self) -> list[float]:
+        small = 1e-12 * abs(self.time)
+        return [b for b in self.breaks if b > self.time + small]
+
+    def _load_to_event(self) -> bool:
+        """Load until f = 1 somewhere, an amplitude bends or the end time comes.
+
+        Returns:
+            False if the load grew beyond all bounds without an event.
+        """
+        limit = min([self._end_time, *self._breaks_ahead()])
+        guess = self._next_guess()
+        for _ in range(200):
+            target = min(guess, limit)
+            if self._walk(target, upward=True):
+                return True
+            if self.time >= limit:
+                return True
+            guess = max(2.0 * self.time, self._next_guess())
+            if guess > 1e30 and limit >= _LARGE:
+                return False
+        return False
+
+    def _next_guess(self) -> float:
+        """A time a little after the one at which f would reach 1 under a proportional load."""
+        f = max(self._largest())
+        if f > 0.0 and self.time > 0.0:
+            return self.time * min(1.02 / np.sqrt(min(f, 1.0)), 1e3)
+        return max(1.0, 2.0 * self.time)
+
+    def _unload_to_event(self) -> None:
+        if not self._walk(0.0, upward=False):
+            raise InputError("stepping='path': f stays above 1 down to zero load; check prestress")
+
+    def _walk(self, target: float, *, upward: bool) -> bool:
+        """Go towards a time; stop where the largest f crosses 1.
+
+        Returns:
+            Whether it did.
+        """
+        system, n_forces = self.model.system, len(self.model.loads)
+        begin = self.time
+        tips = [v.tips for v in self._values]
+        path = system.pieces(
+            self.model.state, self.loads_at(target), np.zeros(system.n_window)
+        )
+        for fraction, point in path:
+            here = self.model.state
+            found = [
+                g.crossing(t, here, point, upward=upward)
+                for g, t in zip(self.growths, tips, strict=True)
+            ]
+            hits = [x for x in found if x is not None]
+            if upward:
+                hit = min(hits, default=None)
+            else:
+                # all interfaces must be below 1; a tip-less one does not count
+                waiting = [x for x, t in zip(found, tips, strict=True) if len(t)]
+                hit = None if None in waiting else max(hits, default=None)
+            if hit is not None:
+                point = blend(here, point, hit)
+                start = self.time
+                end = begin + fraction * (target - begin)
+                self.time = start + hit * (end - start)
+            else:
+                self.time = begin + fraction * (target - begin)
+            self.work += work_between(here, point, n_forces)
+            self.model.state = point
+            if hit is not None:
+                self._values = self._evaluate()
+                return True
+        self.time = target
+        self._values = self._evaluate()
+        return False
+
+    # -- letting go ------------------------------------------------------------------------------------
+
+    def _let_go(self, *, all_ready: bool = False) -> None:
+        """Release the critical nodes (or all with f >= 1) at the present load."""
+        for g, v in zip(self.growths, self._values, strict=True):
+            if all_ready:
+                ready = np.flatnonzero(v.f >= 1.0)
+            elif v.f.max(initial=0.0) >= max(self._largest()) * (1.0 - 1e-6):
+                ready = g.ready(v)
+            else:
+                continue
+            if not len(ready):
+                continue
+            nodes = np.unique(v.tips.force_nodes[ready])
+            n_forces = len(self.model.loads)
+            before = self.model.state
+            self.released += self.model.release(g.p, nodes)
+            g.n_released += len(nodes)
+            after = self.model.state
+            self.work += work_between(before, after, n_forces)
+        self._look()
+        self._record("release")
+
+    def _look(self) -> None:
+        """Find tips anew, factor again if the window does not hold them, evaluate."""
+        while True:
+            tips = [g.tips() for g in self.growths]
+            every = [
+                next((t for g, t in zip(self.growths, tips, strict=True) if g.p == p), None)
+                for p in range(len(self.model.pairs))
+            ]
+            if not self.model.require_tips(every):
+                break
+        self._values = [
+            g.evaluate(t, self.model.state) for g, t in zip(self.growths, tips, strict=True)
+        ]
+
+    def _evaluate(self) -> list[TipValues]:
+        return [
+            g.evaluate(v.tips, self.model.state)
+            for g, v in zip(self.growths, self._values, strict=True)
+        ]
+
+    def _largest(self) -> list[float]:
+        return [float(v.f.max(initial=0.0)) for v in self._values] or [0.0]
+
+    def _upper(self, g: Growth) -> float:
+        upper = 1.0 + g.criterion.tolerance
+        if g.criterion.unstable_tolerance is not None and g.n_released:
+            upper = max(upper, 1.0 + g.criterion.unstable_tolerance)
+        return upper
+
+    def _may_run_on(self, unstable: float) -> bool:
+        """Several releases at one load: only within the unstable growth tolerance."""
+        del unstable
+        limits = [
+            g.criterion.unstable_tolerance
+            for g, v in zip(self.growths, self._values, strict=True)
+            if v.f.max(initial=0.0) >= 1.0
+        ]
+        if any(t is None for t in limits):
+            return False
+        worst = [
+            v.f.max(initial=0.0) <= 1.0 + (t or 0.0)
+            for t, v in zip(
+                [g.criterion.unstable_tolerance for g in self.growths], self._values, strict=True
+            )
+        ]
+        return all(worst)
+
+    # -- ends and rows ---------------------------------------------------------------------------------
+
+    def _ended(self) -> str:
+        for end in self.step.ends:
+            if isinstance(end, Time) and self.time >= end.time * (1.0 - 1e-14):
+                return f"time {end.time:g} reached"
+            if isinstance(end, Releases) and sum(g.n_released for g in self.growths) >= end.count:
+                return f"{end.count} nodes released"
+            if isinstance(end, CrackLength):
+                g = self._growth_of(end)
+                tips = self._values[self.growths.index(g)].tips
+                length = g.extent.length(tips)
+                if length >= end.length * (1.0 - 1e-9):
+                    return f"crack length {end.length:g} of '{g.title}' reached"
+        if self.growths and not any(len(v.tips) for v in self._values):
+            if self._end_time < _LARGE and self.time < self._end_time:
+                return ""
+            return "no crack tip is left"
+        return ""
+
+    def _growth_of(self, end: CrackLength) -> Growth:
+        for g in self.growths:
+            if self.model.pairs[g.p].interface is end.interface:
+                return g
+        raise InputError(
+            f"CrackLength names interface '{end.interface.title}', which has no active Debond in "
+            "this step"
+        )
+
+    def _separated(self, error: NotPositiveDefinite) -> str:
+        del error
+        reason = (
+            "total separation: letting the next node go would leave a body held by nothing; "
+            "the step ends in the last equilibrium before it"
+        )
+        log.warn("%s", reason)
+        return reason
+
+    def _column_names(self) -> list[tuple[str, str, bool]]:
+        moving = [(c.title, c.moves) for c in self.model.supports.columns]
+        names = [(f"u[{t}]", f"R[{t}]", m) for t, m in moving]
+        return names + [(f"F[{x.title}]", f"v[{x.title}]", True) for x in self.model.loads]
+
+    def _record(self, event: str) -> None:
+        state, model = self.model.state, self.model
+        energy = model.system.strain_energy(state)
+        row: Row = {"time": self.time, "event": event}
+        for (load, answer, moves), a, r in zip(
+            self._names, state.loads, state.conjugate, strict=True
+        ):
+            if moves:
+                row[load] = float(a)
+            row[answer] = float(r)
+        for monitor, value in zip(model.monitors, model.system.monitors(state), strict=True):
+            row[f"m[{monitor.title}]"] = float(value)
+        for g, v in zip(self.growths, self._values, strict=True):
+            row[f"a[{g.title}]"] = g.extent.length(v.tips)
+            row[f"area[{g.title}]"] = g.extent.area(v.tips)
+            row[f"released[{g.title}]"] = g.n_released
+            if len(v.tips):
+                i = v.largest
+                row[f"f[{g.title}]"] = float(v.f[i])
+                for mode, rate in zip(("GI", "GII", "GIII"), v.rates[i], strict=True):
+                    row[f"{mode}[{g.title}]"] = float(rate)
+                row[f"node[{g.title}]"] = int(v.tips.node[i])
+        row["strain_energy"] = energy
+        row["external_work"] = self.work
+        row["released_energy"] = self.released
+        row["balance"] = self.work - energy - self.released
+        self.history.append(row)
+        if self._observer is not None:
+            self._observer(event, row)

@@ -1,0 +1,53 @@
+"""Quasi-static growth: what the user may say about a step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fxcrack.errors import InputError
+from fxcrack.steps.until import Until
+
+
+@dataclass(frozen=True)
+class Static:
+    """A quasi-static step.
+
+    Args:
+        until: End condition, or several of which the first met ends the step.
+        stepping: "event" goes from release to release, each at exactly f = 1;
+            "increment" takes time increments and accepts 1 <= f <= 1 + tolerance, cutting back
+            above; "path" keeps the load factor of a proportional load on the equilibrium path at
+            f = 1, also where that means unloading (snap-back under load control).
+        initial: First increment, in time. Increment stepping only, as all below.
+        minimum: Smallest increment; needing less ends the step.
+        maximum: Largest increment.
+        growth: Factor on the increment after an accepted one.
+        cutback: Factor on the increment after a rejected one.
+        max_cutbacks: Cutbacks allowed in one increment.
+    """
+
+    until: Until | tuple[Until, ...]
+    stepping: str = "event"
+    initial: float = 0.1
+    minimum: float = 1e-9
+    maximum: float = float("inf")
+    growth: float = 1.5
+    cutback: float = 0.5
+    max_cutbacks: int = 5
+
+    def __post_init__(self) -> None:
+        """Check the controls."""
+        if self.stepping not in ("event", "increment", "path"):
+            raise InputError(f"stepping = '{self.stepping}': choose event, increment or path")
+        if not 0.0 < self.minimum <= self.initial <= self.maximum:
+            raise InputError(
+                f"increments must satisfy 0 < minimum <= initial <= maximum, "
+                f"not {self.minimum}, {self.initial}, {self.maximum}"
+            )
+        if not (self.growth >= 1.0 and 0.0 < self.cutback < 1.0 and self.max_cutbacks >= 0):
+            raise InputError("growth must be >= 1, cutback between 0 and 1, max_cutbacks >= 0")
+
+    @property
+    def ends(self) -> tuple[Until, ...]:
+        """End conditions as a tuple."""
+        return self.until if isinstance(self.until, tuple) else (self.until,)

@@ -1,0 +1,74 @@
+"""The package is installed whole, and a run of tests on several ranks is honest."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import subprocess
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import fxcrack
+import fxcrack.demos
+import fxcrack.meshes
+
+ROOT = Path(__file__).parent.parent
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
+
+
+def test_every_subpackage_is_installed() -> None:
+    top = Path(fxcrack.__file__).parent
+    found = {
+        ".".join(("fxcrack", *path.parent.relative_to(top).parts))
+        for path in top.rglob("__init__.py")
+    }
+    # In the source tree these two stand at the top level.
+    found |= {"fxcrack.demos", "fxcrack.meshes"}
+    assert sorted(found) == sorted(PROJECT["tool"]["setuptools"]["packages"])
+
+
+@pytest.mark.parametrize("package", [fxcrack.demos, fxcrack.meshes])
+def test_packages_of_the_top_level_are_importable(package: object) -> None:
+    (folder,) = package.__path__
+    assert {p.name for p in Path(folder).glob("*.py")} == {
+        p.name for p in (ROOT / package.__name__.rpartition(".")[2]).glob("*.py")
+    }
+
+
+def test_command_is_installed() -> None:
+    (command,) = importlib.metadata.entry_points(group="console_scripts", name="fxcrack")
+    assert callable(command.load())
+
+
+def test_version_is_the_same_everywhere() -> None:
+    installed = importlib.metadata.version("fxcrack")
+    assert installed == fxcrack.__version__ == PROJECT["project"]["version"]
+
+
+@pytest.mark.parametrize(
+    ("after", "message"),
+    [
+        ("", "passed on rank 0, failed on rank 1"),
+        ("comm.Barrier()", "failed on rank 1, others hang"),
+    ],
+)
+def test_failure_on_one_rank_ends_and_fails_the_run(
+    tmp_path: Path, after: str, message: str
+) -> None:
+    conftest = (ROOT / "tests" / "conftest.py").read_text()
+    hasty = conftest.replace("PATIENCE = 30.0", "PATIENCE = 0.5")
+    assert hasty != conftest
+    (tmp_path / "conftest.py").write_text(hasty)
+    test = f"def test(comm):\n    assert comm.rank == 0\n    {after}\n"
+    (tmp_path / "test_one.py").write_text(test)
+    run = subprocess.run(
+        [ROOT / ".ci" / "mpirun", *"-n 2 python3 -m pytest -p no:cacheprovider".split(), tmp_path],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
+    assert run.returncode != 0
+    assert message in run.stdout + run.stderr
+    assert "assert 1 == 0" in run.stdout + run.stderr
