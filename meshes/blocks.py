@@ -168,14 +168,14 @@ class Block:
 
 @dataclass
 class Blocks:
-    """Blocks and named groups of one gmsh model.
+    """Blocks and named groups of one gmsh model, all of one cell shape and order.
 
     Attributes:
-        blocks: The blocks, in the order in which their nodes are numbered.
-        groups: Shape and nodes of the parts of each named group.
+        blocks: The blocks by the names of their groups of cells, in the order of their nodes.
+        groups: Shape and nodes of the parts of each named group of facets, edges or nodes.
     """
 
-    blocks: list[Block] = field(default_factory=list)
+    blocks: dict[str, Block] = field(default_factory=dict)
     groups: dict[str, list[tuple[str, Ints]]] = field(default_factory=dict)
 
     def add(
@@ -196,35 +196,34 @@ class Blocks:
                 f"cells must be {' or '.join(CELLS[len(axes)])} of order 1 or 2, not "
                 f"'{cell}' of order {order}"
             )
-        first = sum(int(np.prod(b.shape)) for b in self.blocks)
+        first = sum(int(np.prod(b.shape)) for b in self.blocks.values())
         lines = tuple(np.asarray(x, dtype=float) for x in axes)
-        block = Block(lines, cell, order, mirror, first)
-        self.blocks.append(block)
-        self.group(name, (cell, block.cells()))
-        return block
+        self.blocks[name] = Block(lines, cell, order, mirror, first)
+        return self.blocks[name]
 
     def group(self, name: str, *parts: tuple[str, Ints]) -> None:
-        """Name parts of blocks, all of one shape."""
+        """Name parts of blocks, all of one shape; a name used before gets these parts as well."""
         self.groups.setdefault(name, []).extend(parts)
 
     def write(self, model: Any) -> None:
         """Put blocks and groups into the current gmsh model."""
-        for tag, block in enumerate(self.blocks, 1):
-            model.addDiscreteEntity(block.dim, tag)
+        order = 1
+        for tag, (name, block) in enumerate(self.blocks.items(), 1):
+            order = block.order
             points = block.points()
+            model.addDiscreteEntity(block.dim, tag)
             nodes = 1 + block.first + np.arange(len(points))
             model.mesh.addNodes(block.dim, tag, nodes, points.ravel())
-        placed = 0
+            kind = _SHAPES[block.cell][1 + order]
+            model.mesh.addElementsByType(tag, kind, [], 1 + block.cells().ravel())
+            model.addPhysicalGroup(block.dim, [tag], name=name)
         for name, parts in self.groups.items():
-            dim = _SHAPES[parts[0][0]][0]
             tags = []
             for shape, rows in parts:
-                is_cell = dim == self.blocks[0].dim
-                placed += is_cell
-                tag = placed if is_cell else model.addDiscreteEntity(dim)
-                kind = _SHAPES[shape][1 + self.blocks[0].order]
-                model.mesh.addElementsByType(tag, kind, [], 1 + rows.ravel())
-                tags.append(tag)
+                dim = _SHAPES[shape][0]
+                tags.append(model.addDiscreteEntity(dim))
+                kind = _SHAPES[shape][1 + order]
+                model.mesh.addElementsByType(tags[-1], kind, [], 1 + rows.ravel())
             model.addPhysicalGroup(dim, tags, name=name)
 
 

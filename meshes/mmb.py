@@ -44,7 +44,7 @@ def mmb_2d(
 
     def make() -> Blocks:
         model = bending(half_span, height, dx, ny, cell, order)
-        model.group("lever_end", model.blocks[0].part(x=0.0, y=height))
+        model.group("lever_end", model.blocks["upper"].part(x=0.0, y=height))
         return model
 
     return build(comm, "mmb_2d", make, out)

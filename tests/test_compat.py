@@ -145,7 +145,7 @@ def test_vertices_that_make_no_entity_are_not_found(comm: MPI.Comm) -> None:
 @pytest.mark.parametrize("name", ["interval", *CELLS])
 def test_gmsh_permutation_orders_the_nodes_as_dolfinx_does(name: str, degree: int) -> None:
     family = {"interval": "line", "quadrilateral": "quadrangle"}.get(name, name)
-    gmsh.initialize(["", "-noenv"], False, False)
+    gmsh.initialize(readConfigFiles=False)
     try:
         code = gmsh.model.mesh.getElementType(family, degree)
         _, dim, _, count, nodes, _ = gmsh.model.mesh.getElementProperties(code)

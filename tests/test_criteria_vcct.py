@@ -1,4 +1,4 @@
-"""Energy release rates by virtual and by exact closure, toughness, and the criteria that hold them."""
+"""Energy release rates by virtual and exact closure, toughness, and the criteria holding them."""
 
 from __future__ import annotations
 
@@ -29,8 +29,10 @@ Array = npt.NDArray[np.float64]
 KINDS = ("tributary", "ahead", "ahead_sqrt", "behind")
 ROUND_OFF = 1e-12  # a few roundings of well-scaled products
 
-vectors = arrays(np.float64, (3, 1, 3), elements=st.floats(-10.0, 10.0))
-pairs = arrays(np.float64, (3, 2, 3), elements=st.floats(-10.0, 10.0))
+# Zeros and numbers far from underflow: products of tiny ones would round differently.
+component = st.one_of(st.just(0.0), st.floats(1e-3, 10.0), st.floats(-10.0, -1e-3))
+vectors = arrays(np.float64, (3, 1, 3), elements=component)
+pairs = arrays(np.float64, (3, 2, 3), elements=component)
 lengths = arrays(np.float64, 3, elements=st.floats(0.1, 10.0))
 kinds = st.sampled_from(KINDS)
 
@@ -99,7 +101,8 @@ def test_second_order_without_midside_nodes_is_first_order(
 
 def test_signs() -> None:
     closed = W * [-1.0, 1.0, 1.0]
-    assert energy_release_rates(F, closed, 1.0, 1.0, 1.0).tolist()[0] == [0.0, 0.3, 0.6]
+    g = energy_release_rates(F, closed, 1.0, 1.0, 1.0)[0]
+    assert g == pytest.approx([0.0, 0.3, 0.6], rel=ROUND_OFF)
     pressed = F * [-1.0, 1.0, -1.0]
     g = energy_release_rates(pressed, W, 1.0, 1.0, 1.0)[0]
     assert g[0] < 0.0 < g[1] and g[2] < 0.0
@@ -220,7 +223,7 @@ def test_closure_turns_with_the_frame() -> None:
 def test_a_unit_in_compression_does_not_open() -> None:
     p = np.array([[[-1.0, 2.0, 0.0]], [[1.0, 2.0, 0.0]]])
     rates = closure_rates(p, 0.1 * p, [1.0, 2.0])
-    assert rates.tolist() == pytest.approx([[0.0, 0.2, 0.0], [0.025, 0.1, 0.0]])
+    assert rates == pytest.approx(np.array([[0.0, 0.2, 0.0], [0.025, 0.1, 0.0]]), rel=ROUND_OFF)
 
 
 def test_a_pressed_corner_of_a_pulled_unit_counts() -> None:
@@ -265,9 +268,9 @@ def test_shear_modes_default_to_the_mode_before() -> None:
 @pytest.mark.parametrize(
     ("value", "says"),
     [
-        ([1.0] * 4, r"GIc has 4 values for 6 slave nodes: slave nodes 4, 5 have none"),
-        ([1.0] * 5, r"slave node 5 have none|slave node 5 has none"),
-        ([1.0] * 8, r"entries 6 to 7 are too many"),
+        ([1.0] * 4, r"GIc has 4 values for 6 slave nodes: without one: slave nodes 4, 5;"),
+        ([1.0] * 5, r"5 values for 6 slave nodes: without one: slave node 5;"),
+        ([1.0] * 8, r"8 values for 6 slave nodes: entries 6 to 7 are too many"),
         (lambda x: x[:, 0], r"GIc = 0\.0 at slave node 1; .* not at slave node 1"),
         (lambda x: np.where(x[:, 0] > 1.0, np.nan, 1.0), r"not at slave nodes 3, 4"),
         (

@@ -60,10 +60,14 @@ def test_failure_on_one_rank_ends_and_fails_the_run(
     hasty = conftest.replace("PATIENCE = 30.0", "PATIENCE = 0.5")
     assert hasty != conftest
     (tmp_path / "conftest.py").write_text(hasty)
-    test = f"def test(comm):\n    assert comm.rank == 0\n    {after}\n"
+    test = f"def test(comm):\n    if comm.rank == 1:\n        raise ValueError('it broke')\n    {after}\n"
     (tmp_path / "test_one.py").write_text(test)
     run = subprocess.run(
-        [ROOT / ".ci" / "mpirun", *"-n 2 python3 -m pytest -p no:cacheprovider".split(), tmp_path],
+        [
+            ROOT / ".ci" / "mpirun",
+            *"-n 2 python3 -m pytest --color=no -p no:cacheprovider".split(),
+            tmp_path,
+        ],
         capture_output=True,
         text=True,
         timeout=60,
@@ -71,4 +75,4 @@ def test_failure_on_one_rank_ends_and_fails_the_run(
     )
     assert run.returncode != 0
     assert message in run.stdout + run.stderr
-    assert "assert 1 == 0" in run.stdout + run.stderr
+    assert "ValueError: it broke" in run.stdout + run.stderr

@@ -45,8 +45,8 @@ def grid(cell: str, order: int, n: int = 4) -> tuple[Blocks, Block]:
 
 def add(model: Blocks, name: str, where: Where, **at: float) -> None:
     """A group of the parts of a grid on a plane or line whose midpoints fulfil a condition."""
-    shape, rows = model.blocks[0].part(**at)
-    x = model.blocks[0].points()[rows].mean(axis=1)
+    shape, rows = model.blocks["body"].part(**at)
+    x = model.blocks["body"].points()[rows].mean(axis=1)
     model.group(name, (shape, rows[where(x)]))
 
 
@@ -94,15 +94,27 @@ def test_surface_that_ends_inside(cell: str, order: int) -> None:
     assert np.array_equal(new.points[new.cells], raw.points[raw.cells])
 
 
-@pytest.mark.parametrize(("cell", "order"), [c for c in CASES if dimension(c[0]) == 3])
-def test_patch_inside_a_body(cell: str, order: int) -> None:
-    """2 x 2 boxes of a plane: only nodes off the patch's border are doubled."""
+@pytest.mark.parametrize(
+    ("cell", "order", "n_new", "n_facets"),
+    # Only the middle node is off the border. With it go the midsides of the edges that meet there
+    # (4, and 2 diagonals of triangles) and the centres of quadrilaterals; two of the triangles
+    # have all their corners on the border.
+    [
+        ("hexahedron", 1, 1, 4),
+        ("hexahedron", 2, 1 + 4 + 4, 4),
+        ("tetrahedron", 1, 1, 6),
+        ("tetrahedron", 2, 1 + 6, 6),
+    ],
+)
+def test_patch_inside_a_body(cell: str, order: int, n_new: int, n_facets: int) -> None:
+    """2 x 2 boxes of a plane."""
     model, _ = grid(cell, order)
     add(model, "cut", lambda x: (abs(x[:, [0, 2]] - 2.0) < 1.0).all(axis=1), y=2.0)
     raw = raw_mesh(model)
     new = split_surface(raw, Split("cut", "upper", "lower", (0, -1, 0)))
-    assert len(new.points) - len(raw.points) == (2 * order - 1) ** 2
-    assert side_of(new, "upper") == {-1}
+    assert len(new.points) - len(raw.points) == n_new
+    assert len(new.groups["upper"].rows) == len(new.groups["lower"].rows) == n_facets
+    assert side_of(new, "upper") == {-1} and side_of(new, "lower") == {1}
 
 
 @pytest.mark.parametrize(("cell", "order"), CASES)
@@ -176,19 +188,19 @@ def test_second_split_crosses_the_first() -> None:
         assert len(new.groups[name].rows) == 4
 
 
-def closed_surface(model: Blocks, block: Block) -> None:
+def closed_surface(model: Blocks) -> None:
     """The boundary of the middle box of a 3 x 3 grid."""
     for axis in "xy":
         for value in (1.0, 2.0):
-            add(model, "shell", lambda x: ((x > 0.9) & (x < 2.1)).all(axis=1), **{axis: value})
+            add(model, "shell", lambda x: (abs(x[:, :2] - 1.5) < 0.6).all(axis=1), **{axis: value})
 
 
 def test_closed_surface_by_the_cells_inside() -> None:
-    model, block = grid("quadrilateral", 1, 3)
-    closed_surface(model, block)
-    inside = block.points()[block.cells()].mean(axis=1)[:, :2]
-    model.group("core", ("quadrilateral", block.cells()[(inside == 1.5).all(axis=1)]))
+    model, _ = grid("quadrilateral", 1, 3)
+    closed_surface(model)
     raw = raw_mesh(model)
+    middle = raw.points[raw.cells].mean(axis=1)
+    raw.cell_groups["core"] = np.flatnonzero((middle == 1.5).all(axis=1))
     new = split_surface(raw, Split("shell", "fibre", "matrix", "core"))
     assert len(new.points) == len(raw.points) + 4
     (core,) = new.cell_groups["core"]

@@ -179,7 +179,7 @@ class Power:
         """
         shares = _normalised(rates)
         tough = np.broadcast_to(np.asarray(toughness, dtype=np.float64), shares.shape)
-        some = ~(shares.max(axis=-1) == 0.0)  # a NaN counts as some, and stays
+        some = shares.max(axis=-1) != 0.0  # NaN counts as some, and stays
         relative = np.where(some[..., None], shares / tough, np.array([1.0, 0.0, 0.0]))
         scale = np.exp(_log_scale_to_one(relative, self.exponents))
         return np.where(some, scale * shares.sum(axis=-1), tough[..., 0])
@@ -211,7 +211,7 @@ def _normalised(rates: npt.ArrayLike) -> Array:
     """Clipped rates divided by the largest of their row; zeros stay."""
     g = clip(rates)
     top = g.max(axis=-1, keepdims=True)
-    return np.divide(g, top, out=g.copy(), where=top > 0.0)
+    return np.divide(g, top, out=g.copy(), where=top != 0.0)
 
 
 def _shares(rates: npt.ArrayLike) -> tuple[Array, Array]:
@@ -221,8 +221,8 @@ def _shares(rates: npt.ArrayLike) -> tuple[Array, Array]:
     whole = g[..., 0] + shear
     zero = np.zeros_like(shear)
     return (
-        np.divide(shear, whole, out=zero.copy(), where=whole > 0.0),
-        np.divide(g[..., 2], shear, out=zero.copy(), where=shear > 0.0),
+        np.divide(shear, whole, out=zero.copy(), where=whole != 0.0),
+        np.divide(g[..., 2], shear, out=zero.copy(), where=shear != 0.0),
     )
 
 

@@ -71,7 +71,7 @@ def check_property(owner: str, name: str, value: Property, n_slave: int | None =
     array = _per_node(owner, name, value)
     if n_slave is not None and array.size != n_slave:
         if array.size < n_slave:
-            where = f"{_listed(np.arange(array.size, n_slave))} have none"
+            where = f"without one: {_listed(np.arange(array.size, n_slave))}"
         else:
             where = f"entries {n_slave} to {array.size - 1} are too many"
         raise InputError(

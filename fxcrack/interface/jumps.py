@@ -20,6 +20,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 from scipy.sparse.csgraph import connected_components
 
+from fxcrack import log
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, InterfaceError, agree
 from fxcrack.interface.pairing import Pair
@@ -153,14 +154,18 @@ class JumpCoordinates:
 
 
 def align_frames(
-    pairs: list[Pair], which: list[Ints], value: list[Array], supports: Supports, gdim: int
+    pairs: list[Pair],
+    which: list[Ints],
+    jumped: list[npt.NDArray[np.bool_]],
+    supports: Supports,
+    gdim: int,
 ) -> tuple[list[Array], list[npt.NDArray[np.bool_]]]:
     """Turn the frames of slave nodes that supports hold, and mark the jumps held with them.
 
     Args:
         pairs: Interfaces.
         which: Per pair, support column of each (slave node, component), -1 if free.
-        value: Per pair, prescribed value likewise.
+        jumped: Per pair, the slave nodes that have a jump, shape (n_nodes,).
         supports: For the titles in messages.
         gdim: Dimension.
 
@@ -170,12 +175,11 @@ def align_frames(
     Raises:
         InterfaceError: A held direction is oblique to the interface.
     """
-    del value
     frames, held = [], []
-    for pair, columns in zip(pairs, which, strict=True):
+    for pair, columns, has_jump in zip(pairs, which, jumped, strict=True):
         frame = pair.frames.copy()
         hold = np.zeros((pair.surface.n_nodes, gdim), dtype=bool)
-        for node in np.flatnonzero((columns >= 0).any(axis=1) & pair.paired):
+        for node in np.flatnonzero((columns >= 0).any(axis=1) & has_jump):
             axes = [np.eye(gdim)[c] for c in np.flatnonzero(columns[node] >= 0)]
             if len(axes) == gdim:
                 hold[node] = True
@@ -206,11 +210,16 @@ def align_frames(
 class _Replica:
     """What every rank knows of the displacement nodes that take part in an interface."""
 
-    def __init__(self, continuum: Continuum, pairs: list[Pair], supports: Supports) -> None:
+    def __init__(
+        self,
+        continuum: Continuum,
+        pairs: list[Pair],
+        supports: Supports,
+        jumped: list[npt.NDArray[np.bool_]],
+    ) -> None:
         gdim, comm = continuum.gdim, continuum.comm
-        used = [p.surface.dofs[p.paired] for p in pairs] + [
-            p.masters[p.paired].ravel() for p in pairs
-        ]
+        used = [p.surface.dofs[j] for p, j in zip(pairs, jumped, strict=True)]
+        used += [p.masters[j].ravel() for p, j in zip(pairs, jumped, strict=True)]
         self.blocks = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
         self.gdim = gdim
         self.low = continuum.offset // gdim
@@ -242,11 +251,20 @@ def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -
     return a.support.amplitude == b.support.amplitude and abs(one - other) <= 1e-12 * abs(one)
 
 
-def _check_slaves(pairs: list[Pair], replica: _Replica, supports: Supports) -> None:
-    """Enforce the rules of design.md, section 2; the same verdict on every rank."""
+def _check_slaves(
+    pairs: list[Pair],
+    jumped: list[npt.NDArray[np.bool_]],
+    replica: _Replica,
+    supports: Supports,
+) -> None:
+    """Enforce the rules of design.md, section 2; the same verdict on every rank.
+
+    Open nodes whose support their masters do not share lose their jump: they cannot be bonded
+    or touch, but nothing else is lost. ``jumped`` is changed in place.
+    """
     seen: dict[int, str] = {}
-    for pair in pairs:
-        for node in np.flatnonzero(pair.paired):
+    for pair, taking_part in zip(pairs, jumped, strict=True):
+        for node in np.flatnonzero(taking_part):
             dof = int(pair.surface.dofs[node])
             if dof in seen:
                 raise InterfaceError(
@@ -256,26 +274,43 @@ def _check_slaves(pairs: list[Pair], replica: _Replica, supports: Supports) -> N
                 )
             seen[dof] = pair.title
         slave = replica.find(pair.surface.dofs)
-        for node in np.flatnonzero(pair.paired):
-            i = slave[node]
-            for c in np.flatnonzero(replica.which[i] >= 0):
-                used = replica.find(pair.masters[node][pair.weights[node] != 0.0])
-                carried = replica.which[used, c]
-                column = supports.columns[replica.which[i, c]]
-                same = np.array(
-                    [
-                        k >= 0 and _moves_alike(supports.columns[k], column, a, replica.value[i, c])
-                        for k, a in zip(carried, replica.value[used, c], strict=True)
-                    ]
+        supported = taking_part.copy()
+        supported[taking_part] = (replica.which[slave[taking_part]] >= 0).any(axis=1)
+        for node in np.flatnonzero(supported):
+            column = _unshared_support(pair, int(node), int(slave[node]), replica, supports)
+            if column is None:
+                continue
+            if pair.bonded[node]:
+                raise InterfaceError(
+                    f"support '{column.title}' holds the slave node at {pair.surface.x[node]} of "
+                    f"interface '{pair.title}', but not its master nodes in the same way; "
+                    "support both faces there alike, or end the support or the interface "
+                    "before each other"
                 )
-                if not np.all(same):
-                    title = supports.columns[replica.which[i, c]].title
-                    raise InterfaceError(
-                        f"support '{title}' holds the slave node at {pair.surface.x[node]} of "
-                        f"interface '{pair.title}', but not its master nodes in the same way; "
-                        "support both faces there alike, or end the support or the interface "
-                        "before each other"
-                    )
+            taking_part[node] = False
+            if pair.interface.contact:
+                log.warn(
+                    "interface '%s': no contact at the node at %s, which support '%s' holds",
+                    pair.title,
+                    pair.surface.x[node],
+                    column.title,
+                )
+
+
+def _unshared_support(
+    pair: Pair, node: int, slave: int, replica: _Replica, supports: Supports
+) -> SupportColumn | None:
+    """A support of a slave node that its masters do not carry in the same way."""
+    masters = replica.find(pair.masters[node][pair.weights[node] != 0.0])
+    for c in np.flatnonzero(replica.which[slave] >= 0):
+        column = supports.columns[replica.which[slave, c]]
+        for m in masters:
+            k = replica.which[m, c]
+            if k < 0 or not _moves_alike(
+                supports.columns[k], column, replica.value[m, c], replica.value[slave, c]
+            ):
+                return column
+    return None
 
 
 def build_coordinates(
@@ -299,12 +334,16 @@ def build_coordinates(
             node that its masters do not share.
     """
     gdim, comm = continuum.gdim, continuum.comm
-    replica = _Replica(continuum, pairs, supports)
-    _check_slaves(pairs, replica, supports)
+    # a node whose jump is free and of no interest keeps its own displacement
+    jumped = [
+        p.paired & (r != INNER).any(axis=1) for p, r in zip(pairs, roles, strict=True)
+    ]
+    replica = _Replica(continuum, pairs, supports, jumped)
+    _check_slaves(pairs, jumped, replica, supports)
     slaves = [replica.find(p.surface.dofs) for p in pairs]
-    paired = [np.flatnonzero(p.paired) for p in pairs]
+    paired = [np.flatnonzero(j) for j in jumped]
 
-    def at_slaves(table: Array | Ints, fill: float) -> list[Array]:
+    def at_slaves(table: Ints, fill: int) -> list[Ints]:
         out = []
         for p, s, k in zip(pairs, slaves, paired, strict=True):
             rows = np.full((p.surface.n_nodes, gdim), fill, dtype=table.dtype)
@@ -314,14 +353,14 @@ def build_coordinates(
 
     frames, held = align_frames(
         pairs,
-        at_slaves(replica.which, -1),  # type: ignore[arg-type]
-        at_slaves(replica.value, 0.0),
+        at_slaves(replica.which, -1),
+        jumped,
         supports,
         gdim,
     )
     roles = [
-        np.where(h | ~p.paired[:, None], HELD, r)
-        for r, h, p in zip(roles, held, pairs, strict=True)
+        np.where(h | ~j[:, None], HELD, r)
+        for r, h, j in zip(roles, held, jumped, strict=True)
     ]
 
     # which owned dof slots have a column of their own

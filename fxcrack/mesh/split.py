@@ -27,6 +27,8 @@ class Split:
 
     The slave side gets new nodes. The name of the surface goes; groups of facets, edges and nodes
     that lie on it get both copies, those that only touch it stay with the cells they belong to.
+    Where the surface ends inside the mesh, the nodes of that border are nodes of both sides; a
+    facet with no corner node off that border cannot open and is in neither.
 
     Attributes:
         surface: Group of facets inside the mesh; it may end inside the mesh or at its boundary.
@@ -87,16 +89,16 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
         _pieces(corners, table, corners.facets[np.arange(len(slave_side)), side])
         for side in (slave_side, 1 - slave_side)
     ]
-    moved = np.setdiff1d(held[0], held[1])
-    if not len(moved):
-        raise MeshError(
-            f"splitting along '{split.surface}' separates nothing: all its nodes are on its inner "
-            f"border; refine the mesh so that facets of the surface share nodes, or extend it to "
-            f"the boundary"
-        )
     moves = np.zeros_like(corners.pair, dtype=bool)
     on = corners.pair >= 0
-    moves[on] = np.isin(corners.piece[corners.pair[on]], moved)
+    moves[on] = np.isin(corners.piece[corners.pair[on]], np.setdiff1d(held[0], held[1]))
+    moves &= moves[:, : raw.n_vertices(raw.tdim)] @ _vertices_of_nodes(raw)
+    if not moves.any():
+        raise MeshError(
+            f"splitting along '{split.surface}' separates nothing: all its corner nodes are on its "
+            f"inner border; refine the mesh so that facets of the surface meet at a node inside "
+            f"it, or extend it to the boundary"
+        )
     doubled = np.unique(corners.nodes[moves])
     renamed = corners.nodes.copy()
     renamed[moves] = len(raw.points) + np.searchsorted(doubled, corners.nodes[moves])
@@ -108,10 +110,13 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
         for name, group in raw.groups.items()
         if name != split.surface
     }
-    facet_dim = raw.tdim - 1
-    for name, side in ((split.slave, slave_side), (split.master, 1 - slave_side)):
-        cell, local = corners.facets[np.arange(len(side)), side].T
-        groups[name] = RawGroup(facet_dim, renamed[cell[:, None], table[local]])
+    facets = [
+        renamed[corners.facets[i, side, :1], table[corners.facets[i, side, 1]]]
+        for i, side in ((np.arange(len(slave_side)), s) for s in (slave_side, 1 - slave_side))
+    ]
+    parted = (np.sort(facets[0], axis=1) != np.sort(facets[1], axis=1)).any(axis=1)
+    for name, rows in zip((split.slave, split.master), facets, strict=True):
+        groups[name] = RawGroup(raw.tdim - 1, rows[parted])
     points = np.concatenate((raw.points, raw.points[doubled]))
     return replace(raw, points=points, cells=cells, groups=groups)
 
@@ -151,6 +156,22 @@ def _check_names(raw: RawMesh, split: Split) -> None:
 def _facet_nodes(raw: RawMesh) -> Ints:
     """Local nodes of each facet of the reference cell, vertices first."""
     return np.array(reference(raw.cell, raw.order).entity_closure_dofs[raw.tdim - 1])
+
+
+def _vertices_of_nodes(raw: RawMesh) -> npt.NDArray[np.bool_]:
+    """Which vertices span the part of the cell a node belongs to, shape (n_vertices, n_nodes).
+
+    DOLFINx knows edges and facets by their vertices: a midside node can be doubled only together
+    with a vertex of its edge or facet.
+    """
+    element = reference(raw.cell, raw.order)
+    n_vertices = raw.n_vertices(raw.tdim)
+    spans = np.zeros((n_vertices, element.dim), dtype=bool)
+    for own, closure in zip(element.entity_dofs, element.entity_closure_dofs, strict=True):
+        for nodes, with_boundary in zip(own, closure, strict=True):
+            vertices = [v for v in with_boundary if v < n_vertices]
+            spans[np.ix_(vertices, nodes)] = True
+    return spans
 
 
 def _corners(raw: RawMesh, surface: str) -> _Corners:
