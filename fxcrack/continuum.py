@@ -12,6 +12,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+import basix
 import basix.ufl
 import dolfinx.fem.petsc
 import dolfinx.mesh
@@ -166,8 +167,14 @@ class Continuum:
     def _field(self, value: Field) -> Any:
         if not callable(value):
             return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
-        scalar = fem.functionspace(self.mesh.domain, ("Lagrange", self.order))
-        function = fem.Function(scalar)
+        # points inside the cells: a step at a cell boundary stays a step
+        element = basix.ufl.element(
+            "DG",
+            self.mesh.domain.basix_cell(),
+            self.order,
+            lagrange_variant=basix.LagrangeVariant.legendre,
+        )
+        function = fem.Function(fem.functionspace(self.mesh.domain, element))
         function.interpolate(value)
         return function
 

@@ -151,7 +151,8 @@ class Block:
             for x, chosen in zip(self.axes, layers, strict=True)
         ]
         corner = np.meshgrid(*(self.order * i for i in indices), indexing="ij")
-        return np.ravel_multi_index([c.ravel() for c in corner], self.shape)
+        first = np.ravel_multi_index([c.ravel() for c in corner], self.shape)
+        return first.astype(np.int64)
 
     def _rows(self, shape: str, boxes: Ints, sides: dict[int, int]) -> Ints:
         """Nodes of the entities of a shape on given sides of the boxes, in gmsh order."""
@@ -162,8 +163,8 @@ class Block:
             means = [vertices[list(chosen)].mean(axis=0) for chosen in between]
             places = self.order * np.vstack([vertices, *means])
             offsets.append(np.rint(places).astype(np.int64) @ strides)
-        rows = boxes[:, None, None] + np.array(offsets)[None]
-        return self.first + rows.reshape(-1, rows.shape[-1])
+        rows: Ints = self.first + boxes[:, None, None] + np.array(offsets)[None]
+        return rows.reshape(-1, rows.shape[-1])
 
 
 @dataclass

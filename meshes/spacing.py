@@ -41,7 +41,7 @@ def growing(
     Args:
         start: Where the steps are smallest (length).
         stop: The other end (length).
-        size: First step (length).
+        size: Step of the even region; growth starts from it (length).
         growth: Ratio of neighbouring steps.
         largest: Upper bound of the steps (length).
         even_length: Length over which the steps stay ``size``, rounded up to whole steps.
@@ -60,8 +60,11 @@ def growing(
         raise MeshError(
             f"an even region of {even_length:g} with steps of {size:g} does not fit into {length:g}"
         )
+    if n_even and length - n_even * size < 0.5 * size:
+        n_even -= 1  # no sliver between the even region and the end
     places = [size * i for i in range(n_even + 1)]
-    rest, step, steps = length - places[-1], size, []
+    rest, step = length - places[-1], size
+    steps: list[float] = []
     while rest > 1e-9 * length and sum(steps) < rest * (1 - 1e-9):
         step = max(min(step * growth, largest), size)
         steps.append(step)

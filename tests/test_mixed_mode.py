@@ -22,8 +22,8 @@ rates = arrays(np.float64, (4, 3), elements=rate)
 toughness = arrays(np.float64, (4, 3), elements=st.floats(0.01, 100.0))
 laws = st.sampled_from(LAWS)
 
-# A dozen roundings, amplified by exponents up to 2.5 over ratios up to 1e5.
-ROUND_OFF = 1e-12
+# A dozen roundings of the mode mix, amplified by toughnesses up to 1e4 apart between modes.
+ROUND_OFF = 1e-11
 
 
 @pytest.fixture(autouse=True)
@@ -122,7 +122,7 @@ def test_reeder_is_bk_when_both_shear_modes_are_equally_tough(
     g: Array, gc: Array, eta: float
 ) -> None:
     gc[:, 2] = gc[:, 1]
-    np.testing.assert_array_equal(Reeder(eta).ratio(g, gc), BK(eta).ratio(g, gc))
+    np.testing.assert_allclose(Reeder(eta).ratio(g, gc), BK(eta).ratio(g, gc), rtol=ROUND_OFF)
 
 
 @given(rates, toughness, st.floats(0.2, 5.0))

@@ -60,8 +60,8 @@ def test_failure_on_one_rank_ends_and_fails_the_run(
     hasty = conftest.replace("PATIENCE = 30.0", "PATIENCE = 0.5")
     assert hasty != conftest
     (tmp_path / "conftest.py").write_text(hasty)
-    test = f"def test(comm):\n    if comm.rank == 1:\n        raise ValueError('it broke')\n    {after}\n"
-    (tmp_path / "test_one.py").write_text(test)
+    lines = ["if comm.rank == 1:", "    raise ValueError('it broke')", after]
+    (tmp_path / "test_one.py").write_text("\n    ".join(["def test(comm):", *lines]))
     run = subprocess.run(
         [
             ROOT / ".ci" / "mpirun",

@@ -77,7 +77,7 @@ class BK:
         """
         shear, _ = _shares(rates)
         g1, g2, _ = _by_mode(toughness)
-        return np.asarray(g1 + (g2 - g1) * shear**self.eta)
+        return _blend(g1, g2, shear**self.eta)
 
     def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Value f = G_T/G_c of the criterion; arguments as for :meth:`critical`.
@@ -114,7 +114,7 @@ class Reeder:
         """
         shear, tear = _shares(rates)
         g1, g2, g3 = _by_mode(toughness)
-        return np.asarray(g1 + (g2 - g1 + (g3 - g2) * tear) * shear**self.eta)
+        return _blend(g1, _blend(g2, g3, tear), shear**self.eta)
 
     def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Value f = G_T/G_c of the criterion; arguments as for :meth:`critical`.
@@ -224,6 +224,11 @@ def _shares(rates: npt.ArrayLike) -> tuple[Array, Array]:
         np.divide(shear, whole, out=zero.copy(), where=whole != 0.0),
         np.divide(g[..., 2], shear, out=zero.copy(), where=shear != 0.0),
     )
+
+
+def _blend(a: Array, b: Array, share: Array) -> Array:
+    """From a at share 0 to b at share 1, exact at both ends however far apart they are."""
+    return np.asarray(a * (1.0 - share) + b * share)
 
 
 def _by_mode(toughness: npt.ArrayLike) -> tuple[Array, Array, Array]:

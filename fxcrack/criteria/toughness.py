@@ -123,8 +123,8 @@ def resolve(
         if result.shape not in ((), (n,)):
             raise InputError(
                 f"{owner}: the function given as {name} returned shape {result.shape} for "
-                f"positions of shape {np.shape(x)}; it must return {n} values (x[:, 0] is the first "
-                "coordinate)"
+                f"positions of shape {np.shape(x)}; it must return {n} values (the first "
+                "coordinate is x[:, 0])"
             )
         result = np.broadcast_to(result, (n,))
     elif np.ndim(value) == 0:

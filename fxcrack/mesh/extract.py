@@ -136,7 +136,7 @@ def _check_plane(points: Floats, tdim: int) -> None:
 def _names(model: Any, tdim: int) -> dict[str, tuple[int, int]]:
     """Name, dimension and tag of every physical group, cells first."""
     found: dict[str, tuple[int, int]] = {}
-    for dim, tag in sorted(model.getPhysicalGroups(), reverse=True):
+    for dim, tag in sorted(model.getPhysicalGroups(), key=lambda group: (-group[0], group[1])):
         name = model.getPhysicalName(dim, tag) or f"group_{dim}_{tag}"
         if name in found:
             raise MeshError(

@@ -83,15 +83,17 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
     corners = _corners(raw, split.surface)
     slave_side = _slave_sides(raw, split, corners)
 
-    # Pieces seen from the slave side of some surface facet and not from the master side.
+    each = np.arange(len(slave_side))
+    sides = [corners.facets[each, slave_side], corners.facets[each, 1 - slave_side]]
+
+    # Pieces seen from the slave side of some surface facet and not from the master side move.
     table = _facet_nodes(raw)
-    held = [
-        _pieces(corners, table, corners.facets[np.arange(len(slave_side)), side])
-        for side in (slave_side, 1 - slave_side)
-    ]
+    slave_pieces, master_pieces = (
+        corners.piece[corners.pair[side[:, :1], table[side[:, 1]]]] for side in sides
+    )
     moves = np.zeros_like(corners.pair, dtype=bool)
     on = corners.pair >= 0
-    moves[on] = np.isin(corners.piece[corners.pair[on]], np.setdiff1d(held[0], held[1]))
+    moves[on] = np.isin(corners.piece[corners.pair[on]], np.setdiff1d(slave_pieces, master_pieces))
     moves &= moves[:, : raw.n_vertices(raw.tdim)] @ _vertices_of_nodes(raw)
     if not moves.any():
         raise MeshError(
@@ -110,10 +112,7 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
         for name, group in raw.groups.items()
         if name != split.surface
     }
-    facets = [
-        renamed[corners.facets[i, side, :1], table[corners.facets[i, side, 1]]]
-        for i, side in ((np.arange(len(slave_side)), s) for s in (slave_side, 1 - slave_side))
-    ]
+    facets = [renamed[side[:, :1], table[side[:, 1]]] for side in sides]
     parted = (np.sort(facets[0], axis=1) != np.sort(facets[1], axis=1)).any(axis=1)
     for name, rows in zip((split.slave, split.master), facets, strict=True):
         groups[name] = RawGroup(raw.tdim - 1, rows[parted])
@@ -233,11 +232,6 @@ def _check_two_sided(
         f"first at {where}; only a surface inside the mesh, with a cell on either side, can be "
         f"split"
     )
-
-
-def _pieces(corners: _Corners, table: Ints, side: Ints) -> Ints:
-    """Pieces of nodes held by facets (cell, local facet), shape (n_facets, 2), sorted."""
-    return np.unique(corners.piece[corners.pair[side[:, :1], table[side[:, 1]]]])
 
 
 def _slave_sides(raw: RawMesh, split: Split, corners: _Corners) -> Ints:

@@ -67,11 +67,17 @@ def border_vectors(
 
 def bordered_matrix(
     stiffness: PETSc.Mat, coordinates: JumpCoordinates, borders: list[PETSc.Vec]
-) -> PETSc.Mat:
-    """A with its borders; destroys nothing; collective."""
+) -> tuple[PETSc.Mat, Array]:
+    """A with its borders; destroys nothing; collective.
+
+    Returns:
+        The matrix, and what each border holds in the window rows (for a force pattern minus the
+        load on the slave face), shape (n_window, n_borders), on every rank.
+    """
     inner = stiffness.ptap(coordinates.transform)
+    on_window = np.zeros((coordinates.n_window, len(borders)))
     if not borders:
-        return inner
+        return inner, on_window
     comm = inner.getComm().tompi4py()
     (n_rows, n_columns), _ = inner.getSizes()
     indptr, indices, data = inner.getValuesCSR()
@@ -81,6 +87,9 @@ def bordered_matrix(
     right = inner.createVecRight()
     for i, border in enumerate(borders):
         coordinates.transform.multTranspose(border, right)
+        if comm.rank == 0:
+            window = slice(coordinates.n_inner, coordinates.n_inner + coordinates.n_window)
+            on_window[:, i] = right.array[window]
         local = np.flatnonzero(right.array)
         values = right.array[local]
         parts.append(
@@ -112,7 +121,8 @@ def bordered_matrix(
         comm=stiffness.getComm(),
     )
     matrix.assemble()
-    return matrix
+    comm.Bcast(on_window)
+    return matrix, on_window
 
 
 class Condensation:
@@ -128,6 +138,7 @@ class Condensation:
 
     Attributes:
         schur: S, shape (n_last, n_last), the same on every rank.
+        borders_on_window: See :func:`bordered_matrix`.
     """
 
     def __init__(
@@ -148,7 +159,7 @@ class Condensation:
         self._inner: PETSc.KSP | None = None
         self._inner_matrix: PETSc.Mat | None = None
         start = time.perf_counter()
-        self.matrix = bordered_matrix(stiffness, coordinates, borders)
+        self.matrix, self.borders_on_window = bordered_matrix(stiffness, coordinates, borders)
         timings.add("transform", start)
         start = time.perf_counter()
         if method == "schur" or (method == "auto" and library() is not None):
