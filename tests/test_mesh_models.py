@@ -41,9 +41,9 @@ def face_nodes(mesh: Mesh, name: str) -> np.ndarray:
     return np.unique(np.concatenate(found).round(9), axis=0)
 
 
-@pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), CASES_2D)
-def test_dcb_2d(comm: MPI.Comm, cell: str, order: int) -> None:
+def test_dcb_2d(cell: str, order: int) -> None:
+    comm = MPI.COMM_SELF
     mesh = dcb_2d(comm, length=10.0, height=1.5, dx=0.5, ny=3, cell=cell, order=order)
     nx, ny, parts = 20, 3, 2 if cell == "triangle" else 1
     nodes = 2 * (order * nx + 1) * (order * ny + 1)
@@ -107,7 +107,6 @@ def test_dcb_spacing() -> None:
     assert "mid_top" not in mesh.groups  # no node in the middle of the width
 
 
-@pytest.mark.mpi
 def test_bending_specimens(comm: MPI.Comm) -> None:
     for mesh in (
         enf_2d(comm, half_span=5.08, height=2.0, dx=0.5, ny=2),
@@ -138,7 +137,6 @@ def test_penny(comm: MPI.Comm) -> None:
     assert_same_on_ghosts(mesh)
 
 
-@pytest.mark.mpi
 def test_center_crack(comm: MPI.Comm) -> None:
     mesh = center_crack(comm, a=1.0, width=8.0, height=6.0, n_crack=5, fine=0.4, growth=1.3)
     x = face_nodes(mesh, "upper_face")[:, 0]

@@ -10,8 +10,13 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
+from fxcrack import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+import dolfinx.mesh
+from test_mesh_read import assert_same_on_ghosts, size
+
 from fxcrack.errors import MeshError
 from fxcrack.mesh import Split, mesh_from_gmsh, read_mesh
+from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.raw import RawGroup, RawMesh
 from fxcrack.mesh.read import gmsh_model, prepare
 from fxcrack.mesh.split import split_surface
@@ -272,11 +277,21 @@ def test_one_sided_surface() -> None:
 
 
 @pytest.mark.mpi
+def test_second_order_nodes_are_those_of_the_topology(comm: MPI.Comm) -> None:
+    """DOLFINx knows edges by their vertices: one geometry node per vertex and per edge, no more."""
+    model, _ = grid("tetrahedron", 2)
+    add(model, "cut", lambda x: (abs(x[:, [0, 2]] - 2.0) < 1.0).all(axis=1), y=2.0)
+    raw = raw_mesh(model, Split("cut", "upper", "lower", (0, 1, 0)))
+    domain = distribute(raw if comm.rank == 0 else None, comm, "patch").domain
+    domain.topology.create_entities(1)
+    n_edges, n_vertices = (domain.topology.index_map(dim).size_global for dim in (1, 0))
+    assert domain.geometry.index_map().size_global == n_edges + n_vertices
+
+
+@pytest.mark.mpi
 @pytest.mark.parametrize("cell", ["triangle", "hexahedron"])
 def test_on_several_ranks(comm: MPI.Comm, shared_path: Path, cell: str) -> None:
     """The distributed mesh has the doubled nodes, and both faces on the boundary."""
-    from test_mesh_read import assert_same_on_ghosts, size
-
     split = Split("cut", "upper", "lower", up(cell))
     path = shared_path / "cut.msh"
     model, _ = grid(cell, 2)
@@ -293,5 +308,12 @@ def test_on_several_ranks(comm: MPI.Comm, shared_path: Path, cell: str) -> None:
         assert made.domain.geometry.index_map().size_global == len(whole.points)
         assert size(made, "upper") == size(made, "lower") == len(whole.groups["upper"].rows)
         assert_same_on_ghosts(made)
+        topology = made.domain.topology
+        topology.create_connectivity(made.tdim - 1, made.tdim)
+        boundary = dolfinx.mesh.exterior_facet_indices(topology)
+        for side in ("upper", "lower"):
+            facets = made.group(side, dim=made.tdim - 1).entities
+            owned = facets[facets < topology.index_map(made.tdim - 1).size_local]
+            assert np.isin(owned, boundary).all()
     with pytest.raises(MeshError, match="mesh 'cut': there is no group of facets 'crack'"):
         read_mesh(path, comm, split=[Split("crack", "s", "m", (0, 1))])

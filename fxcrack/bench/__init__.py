@@ -1,0 +1,1 @@
+"""Benchmarks: the two speed problems, what they are compared with, and how they are measured."""

@@ -1,0 +1,247 @@
+"""Measuring one complete crack growth, and the one static solve it is compared with.
+
+The growth: from the mesh in memory to the onset at the last crack length, form compilation apart.
+The solve: A = T^t K T with every bonded jump held at zero, factored by MUMPS' Cholesky method with
+the options of the condensation, and one back-solve. Memory is the highest resident size of a
+process, summed over the ranks; it counts libraries and mesh too, so the solve gets a process of
+its own:  python -m fxcrack.bench.measure dcb2d 0.0625 0.125 32
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+import fxcrack
+from fxcrack.bench.problem import LENGTHS, Problem
+from fxcrack.errors import SolverError
+from fxcrack.interface.jumps import HELD, INNER, build_coordinates
+from fxcrack.mesh import Mesh
+from fxcrack.output.history import History, Row
+from fxcrack.scene import Scene
+from fxcrack.solve.petsc_schur import mumps_message
+
+_WORKSPACE = 40  # per cent more than MUMPS estimates (ICNTL(14)), as in the condensation
+_CHILD_LIMIT = 1800.0  # seconds
+# what a launcher tells its processes must not reach the processes of another launcher
+_LAUNCHER = ("PMI", "HYD", "MPIR_", "MPICH_", "OMPI_", "PRTE_", "OPAL_", "ORTE_", "MPI_LOCAL")
+_KEPT = ("OMPI_MCA_btl", "OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM")
+
+
+def peak_memory(comm: MPI.Intracomm) -> float:
+    """Highest resident size of every rank's process so far, summed over ranks, MB; collective."""
+    unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024.0
+    return float(comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit))
+
+
+def slowest(comm: MPI.Intracomm, seconds: float) -> float:
+    """The largest of the ranks' times; collective."""
+    return float(comm.allreduce(seconds, op=MPI.MAX))
+
+
+class TimedHistory(History):
+    """A history that notes when each row came, in seconds of ``time.perf_counter``."""
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        super().__init__(comm)
+        self.clock: list[float] = []
+
+    def append(self, row: Row) -> None:
+        """Add a row."""
+        super().append(row)
+        self.clock.append(time.perf_counter())
+
+    def onset(self, length: float) -> int:
+        """Number of the first row in which the crack, at least so long, is about to grow.
+
+        Raises:
+            SolverError: The crack never came that far.
+        """
+        for i, row in enumerate(self.rows):
+            if row["event"] == "onset" and float(row["a[bond]"]) >= length * (1.0 - 1e-9):
+                return i
+        raise SolverError(f"the crack did not reach a = {length:g}: {self.reason}")
+
+
+@dataclass(frozen=True)
+class Growth:
+    """A measured crack growth.
+
+    Attributes:
+        history: Its rows.
+        last: Number of the row at which the measurement ends.
+        seconds: Seconds by phase and in total, the slowest rank's.
+        compile: Seconds of form compilation, not in the total.
+        memory: Highest resident size of the process so far, summed over ranks, MB.
+    """
+
+    history: TimedHistory
+    last: int
+    seconds: dict[str, float]
+    compile: float
+    memory: float
+
+
+def grow(problem: Problem, mesh: Mesh) -> tuple[Growth, Scene]:
+    """Grow the crack from a = 30 to the onset at a = 60; collective; the caller closes the scene."""
+    comm = mesh.comm
+    comm.Barrier()
+    begin = time.perf_counter()
+    scene = problem.scene(mesh)
+    made = time.perf_counter()
+    scene.continuum.compile()
+    compiled = time.perf_counter()
+    scene.history = history = TimedHistory(comm)
+    scene.run(problem.step(scene), progress=False)
+    end = time.perf_counter()
+    last = history.onset(LENGTHS[-1])
+    beyond = end - history.clock[last]
+    seconds = {"scene": made - begin}
+    for phase in ("assemble", "transform", "factor_with_schur", "march"):
+        seconds[phase] = scene.model.timings.seconds[phase]
+    seconds["march"] -= beyond
+    seconds["total"] = end - begin - (compiled - made) - beyond
+    seconds = {phase: slowest(comm, value) for phase, value in seconds.items()}
+    return Growth(history, last, seconds, slowest(comm, compiled - made), peak_memory(comm)), scene
+
+
+def mumps_cholesky(matrix: PETSc.Mat) -> PETSc.PC:
+    """MUMPS' Cholesky factorisation of a positive definite matrix, not yet done; ``setUp`` does it."""
+    matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+    matrix.setOption(PETSc.Mat.Option.SPD, True)
+    solver = PETSc.PC().create(matrix.getComm())
+    solver.setType(PETSc.PC.Type.CHOLESKY)
+    solver.setOperators(matrix)
+    solver.setFactorSolverType("mumps")
+    solver.setFactorSetUpSolverType()
+    solver.getFactorMatrix().setMumpsIcntl(14, _WORKSPACE)
+    return solver
+
+
+def check_mumps(solver: PETSc.PC) -> None:
+    """Raise what MUMPS reported.
+
+    Raises:
+        SolverError: The factorisation failed.
+    """
+    code, detail = (solver.getFactorMatrix().getMumpsInfog(i) for i in (1, 2))
+    if code < 0:
+        raise SolverError(mumps_message(code, detail))
+
+
+def solve_once(problem: Problem, mesh: Mesh) -> dict[str, float]:
+    """The static solve at a = 30: seconds by phase, the load at opening 1; collective."""
+    comm = mesh.comm
+    scene = problem.scene(mesh)
+    scene.continuum.compile()
+    comm.Barrier()
+    clock = [time.perf_counter()]
+    stiffness = scene.continuum.stiffness()
+    clock.append(time.perf_counter())
+    (pair,) = scene.pairs
+    bonded = np.repeat(pair.bonded[:, None], mesh.gdim, axis=1)
+    role = np.where(bonded, HELD, INNER).astype(np.int8)
+    coordinates = build_coordinates(scene.continuum, scene.pairs, [role], scene.supports, 0)
+    matrix = stiffness.ptap(coordinates.transform)
+    stiffness.destroy()
+    clock.append(time.perf_counter())
+
+    upper, lower = problem.load_columns(scene)
+    held = coordinates.first + np.arange(coordinates.n_supports)
+    mine = held.astype(PETSc.IntType) if comm.rank == 0 else np.zeros(0, PETSc.IntType)
+    solution, right, row = matrix.createVecRight(), matrix.createVecLeft(), matrix.createVecLeft()
+    if comm.rank == 0:
+        row.setValues(mine[[upper, lower]], [0.5, -0.5])
+    row.assemble()
+    pull = row.duplicate()
+    matrix.mult(row, pull)
+    reaction = row.dot(pull)  # of the arms as they are; what bending saves comes off below
+    row.copy(solution)
+    matrix.zeroRowsColumns(mine, 1.0, solution, right)
+    clock.append(time.perf_counter())
+    solver = mumps_cholesky(matrix)
+    solver.setUp()
+    check_mumps(solver)
+    clock.append(time.perf_counter())
+    solver.apply(right, solution)
+    clock.append(time.perf_counter())
+    load = reaction + pull.dot(solution) - pull.dot(row)
+
+    assemble, transform, _, factor, solve = (slowest(comm, x) for x in np.diff(clock))
+    for thing in (solver, matrix, coordinates.transform, solution, right, row, pull):
+        thing.destroy()
+    scene.close()
+    return {
+        "assemble": assemble,
+        "transform": transform,
+        "plain_factor": factor,
+        "one_solve": solve,
+        "load": float(load),
+    }
+
+
+def memory_of_one_solve(problem: Problem, comm: MPI.Intracomm) -> float | None:
+    """Peak memory of :func:`solve_once` in processes of its own, MB; collective.
+
+    Returns:
+        ``None`` if the processes could not be started.
+    """
+    found = None
+    if comm.rank == 0:
+        found = _in_own_processes(problem, comm.size)
+    waiting = comm.Ibarrier()
+    while not waiting.Test():
+        time.sleep(0.05)  # leave the cores to the processes measured
+    memory: float | None = comm.bcast(found)
+    return memory
+
+
+def _in_own_processes(problem: Problem, ranks: int) -> float | None:
+    command = [sys.executable, "-m", __name__]
+    command += [problem.name, str(problem.dx), str(problem.dy), str(problem.ny)]
+    if ranks > 1:
+        near = Path(sys.executable).parent / "mpiexec"
+        launcher = str(near) if near.exists() else shutil.which("mpiexec")
+        if launcher is None:
+            return None
+        command = [launcher, "-n", str(ranks), *command]
+    environment = {
+        k: v for k, v in os.environ.items() if k in _KEPT or not k.startswith(_LAUNCHER)
+    }
+    # more ranks than cores are allowed, also in Open MPI (4 and 5)
+    environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
+    environment["PRTE_MCA_rmaps_default_mapping_policy"] = ":oversubscribe"
+    try:
+        run = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True,
+            timeout=_CHILD_LIMIT, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+        return float(json.loads(run.stdout.splitlines()[-1])["memory"])
+    except (OSError, subprocess.SubprocessError, ValueError, LookupError):
+        return None
+
+
+def main() -> None:
+    """Solve once in this process and print its peak memory."""
+    name, dx, dy, ny = sys.argv[1:]
+    comm = MPI.COMM_WORLD
+    problem = Problem.make(name, float(dx), float(dy), int(ny))
+    solve_once(problem, problem.mesh(comm))
+    memory = peak_memory(comm)
+    if comm.rank == 0:
+        print(json.dumps({"memory": memory, "version": fxcrack.__version__}), flush=True)
+
+
+if __name__ == "__main__":
+    main()
