@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -98,7 +98,9 @@ def test_bad_paths_are_named(args: Any, says: str) -> None:
 
 # --- critical stress ------------------------------------------------------------------------------
 
-tractions = arrays(np.float64, (4, 3), elements=st.floats(-100.0, 100.0))
+# Zeros and numbers far from underflow, in the smallest units too.
+component = st.one_of(st.just(0.0), st.floats(1e-6, 100.0), st.floats(-100.0, -1e-6))
+tractions = arrays(np.float64, (4, 3), elements=component)
 
 
 def test_critical_stress_by_hand() -> None:
@@ -122,7 +124,6 @@ def test_critical_stress_grows_with_load_in_any_units(t: Array, load: float, dec
     np.testing.assert_allclose(criterion.value(load * t), load * f, rtol=ROUND_OFF)
     u = 2.0**decades  # exact
     scaled = CriticalStress(10.0 * u, 20.0 * u, 30.0 * u, distance=1.0)
-    assume((np.abs(t[t != 0.0]) > 1e-10).all())  # tiny ones would underflow in the smallest units
     np.testing.assert_allclose(scaled.value(t * u), f, rtol=ROUND_OFF)
 
 
@@ -131,7 +132,7 @@ def test_equal_shear_strengths_do_not_know_the_tangents(t: Array, angle: float) 
     criterion = CriticalStress(10.0, 20.0, 20.0, distance=1.0)
     c, s = np.cos(angle), np.sin(angle)
     turned = t @ np.array([[1.0, 0.0, 0.0], [0.0, c, s], [0.0, -s, c]])
-    np.testing.assert_allclose(criterion.value(turned), criterion.value(t), rtol=1e-11, atol=1e-300)
+    np.testing.assert_allclose(criterion.value(turned), criterion.value(t), rtol=1e-11)
 
 
 def test_strength_against_temperature() -> None:

@@ -31,7 +31,9 @@ Array = npt.NDArray[np.float64]
 
 ROUND_OFF = 1e-12  # a few roundings of well-scaled numbers
 
-openings = arrays(np.float64, 4, elements=st.floats(-1.0, 3.0))
+# Zeros and numbers far from underflow.
+opening = st.one_of(st.just(0.0), st.floats(1e-9, 3.0), st.floats(-1.0, -1e-9))
+openings = arrays(np.float64, 4, elements=opening)
 finals = arrays(np.float64, 4, elements=st.floats(0.1, 2.0))
 
 

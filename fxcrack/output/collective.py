@@ -28,7 +28,8 @@ def together(comm: MPI.Comm, task: str) -> Iterator[None]:
         yield
     except Exception as error:  # whatever it is, the other ranks must hear of it
         cause = error
+    problem = None if cause is None else f"{task}: {type(cause).__name__}: {cause}"
     try:
-        agree(comm, cause and f"{task}: {type(cause).__name__}: {cause}", FxcrackError)
+        agree(comm, problem, FxcrackError)
     except FxcrackError as error:
         raise error from cause

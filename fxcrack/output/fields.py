@@ -5,8 +5,8 @@ interface and not only in the window:
 
     jump_s = u_s - sum_m W_sm u_m,        r = K u - sum_i lambda_i f_i,        t_s = -f_s / area_s
 
-with f_s the bond force on slave node s, its row of T^t r: the residual there, plus that of the
-slaves it carries as a master.
+with f_s the bond or contact force on slave node s, its row of T^t r: the residual there, plus that
+of the slaves it carries as a master.
 """
 
 from __future__ import annotations
@@ -141,15 +141,24 @@ def interface_fields(scene: Scene, u: fem.Function) -> list[InterfaceFields]:
     direct = _shared(continuum, blocks, residual(scene, u))
     slaves = [np.searchsorted(blocks, p.surface.dofs) for p in pairs]
     masters = [np.searchsorted(blocks, p.masters) for p in pairs]
+    acting = [
+        p.paired & (front.bonded | (index >= 0).any(axis=1))
+        for p, front, index in zip(pairs, scene.model.fronts, scene.model.index, strict=True)
+    ]
     total = direct
     for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
         carried = np.zeros_like(direct)
-        for pair, s, m in zip(pairs, slaves, masters, strict=True):
-            on = pair.paired
+        for pair, s, m, on in zip(pairs, slaves, masters, acting, strict=True):
             np.add.at(carried, m[on], pair.weights[on, :, None] * total[s[on], None, :])
         total = direct + carried
     return [
-        _fields_of(scene, p, motion[slaves[p]], motion[masters[p]], total[slaves[p]])
+        _fields_of(
+            scene,
+            p,
+            motion[slaves[p]],
+            motion[masters[p]],
+            np.where(acting[p][:, None], total[slaves[p]], 0.0),
+        )
         for p in range(len(pairs))
     ]
 
@@ -162,7 +171,7 @@ def _fields_of(scene: Scene, p: int, slave: Array, masters: Array, force: Array)
     opening = np.where(pair.paired[:, None], slave - under, 0.0)
     # a component that a support holds carries the support's reaction, not a bond force
     local = np.einsum("nck,nc->nk", model.frames[p], force)
-    local[model.held_by_supports[p] | ~pair.paired[:, None]] = 0.0
+    local[model.held_by_supports[p]] = 0.0
     bond = np.einsum("nck,nk->nc", model.frames[p], local)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
     state = np.where(pair.paired, model.fronts[p].bonded.astype(np.int32), -1)

@@ -1,4 +1,4 @@
-"""Unstructured grids as VTK XML files, which ParaView reads: .vtu, .pvtu for pieces, .pvd for series.
+"""Unstructured grids as VTK XML files for ParaView: .vtu, .pvtu for pieces, .pvd for series.
 
 Arrays are stored at full precision, compressed, base64. No function communicates.
 """
@@ -75,9 +75,10 @@ def _describe(name: str, values: npt.NDArray[Any], grid: Grid) -> str:
     return text
 
 
-def _file(kind: str, body: Iterable[str]) -> str:
+def _file(kind: str, body: Iterable[str], version: str = "1.0") -> str:
     """A VTK file around its lines."""
-    head = f'<VTKFile type="{kind}" version="1.0" byte_order="LittleEndian" header_type="UInt64"'
+    head = f'<VTKFile type="{kind}" version="{version}" byte_order="LittleEndian"'
+    head += ' header_type="UInt64"'
     head += ' compressor="vtkZLibDataCompressor">'
     return "\n".join(['<?xml version="1.0"?>', head, *body, "</VTKFile>", ""])
 
@@ -107,7 +108,8 @@ def write_grid(path: Path, grid: Grid) -> None:
         "</Piece>",
         "</UnstructuredGrid>",
     ]
-    path.write_text(_file("UnstructuredGrid", lines))
+    # from version 2.1 on, VTK numbers the nodes of second-order hexahedra as DOLFINx does
+    path.write_text(_file("UnstructuredGrid", lines, "2.2"))
 
 
 def write_header(path: Path, grid: Grid, pieces: Sequence[str]) -> None:

@@ -1,0 +1,233 @@
+"""A speed problem from its mesh to the numbers that are reported, as plain types for JSON.
+
+    ratio_to_one_solve = total / (assemble + plain_factor + one_solve)
+
+total: mesh in memory to the onset at the last crack length, form compilation excluded. The other
+three belong to one ordinary static solve of the same body, measured in the same process.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from fxcrack.bench.baselines import Columns, Follower, Matrices, Onset, Refactor
+from fxcrack.bench.measure import (
+    Growth,
+    TimedHistory,
+    grow,
+    memory_of_one_solve,
+    slowest,
+    solve_once,
+)
+from fxcrack.bench.problem import LENGTHS, Problem
+from fxcrack.mesh import Mesh
+from fxcrack.scene import Scene
+
+N_RELEASES = 20
+N_COLUMNS = 100
+_PATIENCE = 20.0  # seconds: a baseline that needs no more for the rest is measured whole
+_WAY = (35.0, 55.0)  # crack lengths between which a 3-D growth is compared with beam theory
+
+Result = dict[str, Any]
+
+
+def run(
+    problem: Problem,
+    comm: MPI.Intracomm,
+    *,
+    baseline: bool = False,
+    memory: bool = True,
+    repeat: int = 1,
+) -> Result:
+    """Measure a problem; collective, the same result on every rank.
+
+    Args:
+        problem: Which and how large.
+        comm: Communicator.
+        baseline: Measure the two baselines as well.
+        memory: Measure the memory of the plain solve, in processes of its own.
+        repeat: Measure so often and keep the fastest; for a machine with other work.
+
+    Raises:
+        FxcrackError: Something failed; on all ranks together.
+    """
+    mesh = problem.mesh(comm)
+    growth, scene = grow(problem, mesh)
+    peak, compile_seconds = growth.memory, growth.compile
+    scene.close()
+    solves = [solve_once(problem, mesh)]
+    for _ in range(repeat - 1):
+        again, scene = grow(problem, mesh)
+        scene.close()
+        growth = min(growth, again, key=lambda g: g.seconds["total"])
+        solves.append(solve_once(problem, mesh))
+    plain = {k: min(s[k] for s in solves) for k in ("plain_factor", "one_solve")}
+    assemble = min(growth.seconds["assemble"], *(s["assemble"] for s in solves))
+    one = assemble + plain["plain_factor"] + plain["one_solve"]
+    history = growth.history
+    total = growth.seconds["total"]
+    result: Result = {
+        "problem": problem.name,
+        "dx": problem.dx,
+        **({"dy": problem.dy} if problem.is_3d else {}),
+        "ny": problem.ny,
+        "dofs": history.details["dofs"],
+        "window": history.details["window"],
+        "releases": int(history.rows[growth.last]["released[bond]"]),
+        "events": len(_onsets(growth)),
+        "factorizations": history.details["factorizations"],
+        "ranks": comm.size,
+        "threads": os.environ.get("OMP_NUM_THREADS", "not limited"),
+        "seconds": {**growth.seconds, **plain},
+        "compile": compile_seconds,
+        "one_static_solve": one,
+        "ratio_to_one_solve": total / one,
+        "peak_memory_mb": peak,
+        "peak_memory_plain_mb": memory_of_one_solve(problem, comm) if memory else None,
+        "peak_memory_note": (
+            "highest resident size from the start of the process to the end of the growth, and of "
+            "a process that makes the mesh, assembles, factors with all bonds held and solves "
+            "once; Python and libraries included, summed over ranks"
+        ),
+        "curve": [_point(problem, history, a) for a in LENGTHS],
+    }
+    deviation = _deviation(problem, history)
+    if deviation is not None:
+        result["largest_deviation_from_reference"] = deviation
+    if problem.is_3d:
+        result["beam_theory"] = _beside_beam_theory(problem, growth)
+    if baseline:
+        result |= _baselines(problem, mesh, growth, scene)
+    return result
+
+
+def _onsets(growth: Growth) -> list[int]:
+    """Rows of the events up to the last crack length."""
+    rows = growth.history.rows[: growth.last + 1]
+    return [i for i, row in enumerate(rows) if row["event"] == "onset"]
+
+
+def _point(problem: Problem, history: TimedHistory, length: float) -> dict[str, float]:
+    row = history.rows[history.onset(length)]
+    return {
+        "a": length,
+        "opening": problem.opening(row),
+        "load": problem.load(row),
+        "mean_a": float(row["a[bond]"]),
+    }
+
+
+def _deviation(problem: Problem, history: TimedHistory) -> float | None:
+    """Largest relative deviation from the numbers known for this size, if any are."""
+    found = []
+    for length, (opening, load) in problem.reference().items():
+        row = history.rows[history.onset(length)]
+        found.append(abs(problem.load(row) / load - 1.0))
+        if opening is not None:
+            found.append(abs(problem.opening(row) / opening - 1.0))
+    return max(found, default=None)
+
+
+def _beside_beam_theory(problem: Problem, growth: Growth) -> Result:
+    """Load against opening beside corrected beam theory at the same opening."""
+    rows = [growth.history.rows[i] for i in _onsets(growth)]
+    a = np.array([float(r["a[bond]"]) for r in rows])
+    opening = np.array([problem.opening(r) for r in rows])
+    load = np.array([problem.load(r) for r in rows])
+    theory = np.array([problem.beam_load(d) for d in opening])
+    between = (a >= _WAY[0]) & (a <= _WAY[1])
+    shown = np.unique(np.searchsorted(a, np.arange(LENGTHS[0], LENGTHS[-1] + 1.0, 2.5)))
+    keys = ("a", "opening", "load", "beam_load")
+    return {
+        "mean_load_ratio": float((load / theory)[between].mean()),
+        "between": list(_WAY),
+        "note": "load over corrected beam theory at the same opening; a is the mean of the front",
+        "curve": [
+            dict(zip(keys, (float(x[i]) for x in (a, opening, load, theory)), strict=True))
+            for i in shown[shown < len(a)]
+        ],
+    }
+
+
+def _baselines(problem: Problem, mesh: Mesh, growth: Growth, scene: Scene) -> Result:
+    """Both baselines on the same matrices; each checked against the growth where it follows it."""
+    comm = mesh.comm
+    total = growth.seconds["total"]
+    comm.Barrier()
+    start = time.perf_counter()
+    matrices = Matrices(problem, scene, LENGTHS[-1] - LENGTHS[0] + 2.5 * problem.dx)
+    setup = slowest(comm, time.perf_counter() - start)
+    onsets = _onsets(growth)
+
+    refactor = Refactor(matrices)
+    follower = Follower(matrices, scene, refactor)
+    events = _follow(comm, follower, len(onsets), _PATIENCE)
+    refactor.destroy()
+    each = float(np.mean([e.seconds for e in events[1:]]))
+    seconds = setup + sum(e.seconds for e in events) + (len(onsets) - len(events)) * each
+    refactoring = {
+        "seconds": seconds,
+        "setup": setup,
+        "per_release": each,
+        "measured_releases": len(events),
+        "all_releases": len(onsets),
+        "scaled": len(events) < len(onsets),
+        "largest_difference": _difference(problem, growth, events),
+        "note": "one numeric factorisation and one back-solve per event, ordering made once",
+    }
+
+    columns = Columns(matrices)
+    follower = Follower(matrices, scene, columns)
+    events = _follow(comm, follower, min(N_RELEASES, len(onsets)), 0.0)
+    for c in range(matrices.n_window):
+        if columns.n_columns >= N_COLUMNS:
+            break
+        columns.column(c)
+    needed = int(growth.history.rows[growth.last]["released[bond]"]) * mesh.gdim
+    each = slowest(comm, columns.column_seconds / columns.n_columns)
+    factor = slowest(comm, columns.factor_seconds)
+    by_columns = {
+        "seconds": total - growth.seconds["factor_with_schur"] + factor + needed * each,
+        "factor": factor,
+        "per_column": each,
+        "measured_columns": columns.n_columns,
+        "all_columns": needed,
+        "scaled": columns.n_columns < needed,
+        "largest_difference": _difference(problem, growth, events),
+        "note": "the measured growth with S by one back-solve per released component",
+    }
+    columns.destroy()
+    matrices.destroy()
+    return {
+        "speedup_over_refactor": refactoring["seconds"] / total,
+        "speedup_over_columns": by_columns["seconds"] / total,
+        "baselines": {"refactor": refactoring, "columns": by_columns},
+    }
+
+
+def _follow(comm: MPI.Intracomm, follower: Follower, count: int, patience: float) -> list[Onset]:
+    """Some events, all of them where the rest is expected to take no longer than ``patience``."""
+    events: list[Onset] = []
+    while len(events) < count:
+        if len(events) == min(N_RELEASES, count):
+            rest = (count - len(events)) * slowest(comm, events[-1].seconds)
+            if rest > patience:
+                break
+        events.append(follower.onset())
+    return events
+
+
+def _difference(problem: Problem, growth: Growth, events: list[Onset]) -> float:
+    """Largest relative difference in opening, load and crack length at the same events."""
+    rows = [growth.history.rows[i] for i in _onsets(growth)[: len(events)]]
+    ours: npt.NDArray[np.float64] = np.array(
+        [(problem.opening(r), problem.load(r), float(r["a[bond]"])) for r in rows]
+    )
+    theirs = np.array([(e.opening, e.load, e.length) for e in events])
+    return float(np.abs(theirs / ours - 1.0).max())

@@ -1,0 +1,214 @@
+"""Command line: ``fxcrack demo``, ``fxcrack bench``, ``fxcrack info``.
+
+The same words run under mpirun: rank 0 prints, and an error ends all ranks. Bad input, found on
+all ranks together, is one short message and exit code 1; wrong words are exit code 2. Any other
+error keeps its traceback, and the rank that has it ends the job.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import importlib
+import importlib.metadata
+import importlib.util
+import json
+import os
+import platform
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import fxcrack  # isort: skip  (orders MPI before DOLFINx, ends all ranks on an error)
+import dolfinx
+import petsc4py
+import typer
+from mpi4py import MPI
+from petsc4py import PETSc
+from rich import box
+from rich.console import Console
+from rich.table import Table
+from typer.main import get_command
+
+from fxcrack import log
+from fxcrack.bench.problem import NAMES, Problem
+from fxcrack.errors import FxcrackError, InputError
+from fxcrack.output.atomic import replacing
+from fxcrack.solve.petsc_schur import library
+
+_PATIENCE = 5.0  # seconds a rank that failed waits for the others to fail with it
+_PACKAGES = ("mumps", "superlu_dist", "superlu", "umfpack", "strumpack", "hypre", "ml", "ptscotch")
+
+app = typer.Typer(
+    name="fxcrack",
+    help="Crack propagation along predefined, initially bonded interfaces, on FEniCSx.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+
+def _console() -> Console:
+    """Where rank 0 prints tables; the other ranks print nowhere."""
+    return Console(quiet=MPI.COMM_WORLD.rank > 0, highlight=False)
+
+
+# -- demos -------------------------------------------------------------------------------------------
+
+
+def demo_titles() -> dict[str, str]:
+    """Names of the installed demos and the first line of each, without importing them."""
+    found = importlib.util.find_spec("fxcrack.demos")
+    folders = found.submodule_search_locations if found is not None else None
+    titles = {}
+    for folder in folders or []:
+        for path in sorted(Path(folder).glob("[!_]*.py")):
+            lines = [line.strip("#\"' ") for line in path.read_text(encoding="utf-8").splitlines()]
+            titles[path.stem] = next((t for t in lines if t and t[0].isalpha()), "")
+    return titles
+
+
+@app.command()
+def demo(
+    name: Annotated[str | None, typer.Argument(help="Which demo; without it they are listed.")] = (
+        None
+    ),
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for results.", show_default="out/NAME")
+    ] = None,
+    fine: Annotated[bool, typer.Option("--fine", help="A finer mesh; takes longer.")] = False,
+) -> None:
+    """Run a demo."""
+    titles = demo_titles()
+    if name is None:
+        table = Table(box=None, show_header=False)
+        for known, title in titles.items():
+            table.add_row(known, title)
+        _console().print(table if titles else "no demos are installed")
+        return
+    if name not in titles:
+        raise InputError(f"there is no demo '{name}'; known: {', '.join(titles) or 'none'}")
+    module = importlib.import_module(f"fxcrack.demos.{name}")
+    module.main(Path("out") / name if out is None else out, fine=fine)
+
+
+# -- benchmarks --------------------------------------------------------------------------------------
+
+
+@app.command()
+def bench(
+    name: Annotated[str, typer.Argument(help=" or ".join(NAMES), metavar="NAME")],
+    dx: Annotated[
+        float | None, typer.Option(help="Element length along the arms [0.0625, in 3-D 0.5].")
+    ] = None,
+    dy: Annotated[
+        float | None, typer.Option(help="Element length across the width, 3-D only [2 dx].")
+    ] = None,
+    ny: Annotated[int | None, typer.Option(help="Elements over an arm's height [2/dx].")] = None,
+    baseline: Annotated[
+        bool, typer.Option("--baseline", help="Measure what other scripts would need, too.")
+    ] = False,
+    json_file: Annotated[Path | None, typer.Option("--json", help="File for the numbers.")] = None,
+    repeat: Annotated[int, typer.Option(help="Measure so often, keep the fastest.", min=1)] = 1,
+) -> None:
+    """Measure a speed problem: a crack that grows from a = 30 to a = 60 in a DCB."""
+    from fxcrack.bench import report, run
+
+    problem = Problem.make(name, dx, dy, ny)
+    result = run.run(problem, MPI.COMM_WORLD, baseline=baseline, repeat=repeat)
+    report.show(result, _console())
+    if json_file is not None and MPI.COMM_WORLD.rank == 0:
+        with replacing(json_file) as temporary:
+            temporary.write_text(json.dumps(result, indent=1) + "\n")
+
+
+# -- information -------------------------------------------------------------------------------------
+
+
+def information() -> dict[str, str]:
+    """Versions, solvers and ranks, one line each."""
+    petsc = ".".join(str(n) for n in PETSc.Sys.getVersion())
+    kind = f"{PETSc.ScalarType.__name__}, {PETSc.IntType.__name__}"
+    solvers = [p for p in _PACKAGES if PETSc.Sys.hasExternalPackage(p)]
+    schur = "taken out of MUMPS through PETSc's C interface"
+    if library() is None:
+        schur = "by back-solves (PETSc's C interface with MUMPS cannot be reached)"
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    mpi = MPI.Get_library_version().replace("\0", "").split("\n")[0].split(",")[0]
+    return {
+        "fxcrack": fxcrack.__version__,
+        "python": f"{platform.python_version()}, {platform.system()} {platform.machine()}",
+        "dolfinx": dolfinx.__version__,
+        "PETSc": f"{petsc} ({kind})",
+        "petsc4py": petsc4py.__version__,
+        "mpi4py": f"{importlib.metadata.version('mpi4py')}, {' '.join(mpi.split())}",
+        "gmsh": _gmsh(),
+        **{p: importlib.metadata.version(p) for p in ("numpy", "scipy")},
+        "solvers": ", ".join([*solvers, "gamg"]),
+        "Schur complement": schur,
+        "ranks": str(MPI.COMM_WORLD.size),
+        "threads": f"{os.environ.get('OMP_NUM_THREADS', 'not limited')} "
+        f"(OMP_NUM_THREADS), {cores} cores",
+    }
+
+
+def _gmsh() -> str:
+    """Version of gmsh, or why it does not load."""
+    try:
+        return str(importlib.import_module("gmsh").__version__)
+    except (ImportError, OSError, AttributeError) as error:
+        return f"does not load: {error}"
+
+
+@app.command()
+def info() -> None:
+    """Show versions, available solvers, ranks and threads."""
+    table = Table(box=box.SIMPLE, show_header=False)
+    for key, value in information().items():
+        table.add_row(key, value)
+    _console().print(table)
+
+
+# -- errors and ranks --------------------------------------------------------------------------------
+
+
+def main(argv: Sequence[str] | None = None) -> None:
+    """Run the command line and exit.
+
+    Args:
+        argv: Words after the program's name, ``None`` for those it was called with.
+
+    Raises:
+        SystemExit: Always; with code 0, 1 (an error of fxcrack) or 2 (wrong words).
+    """
+    words = list(sys.argv[1:] if argv is None else argv)
+    code: Any = 0
+    try:
+        with _only_rank_0_prints():
+            log.show()
+            get_command(app)(words, prog_name="fxcrack")
+    except FxcrackError as error:
+        code = 1
+        if MPI.COMM_WORLD.rank == 0 or not _all_here():
+            print(f"fxcrack: {error}", file=sys.stderr, flush=True)
+    except SystemExit as end:
+        code = end.code
+    if code and not _all_here():
+        MPI.COMM_WORLD.Abort(code if isinstance(code, int) else 1)
+    sys.exit(code)
+
+
+@contextlib.contextmanager
+def _only_rank_0_prints() -> Iterator[None]:
+    """Let what the other ranks print vanish; uncaught errors still show."""
+    if MPI.COMM_WORLD.rank == 0:
+        yield
+        return
+    with (
+        open(os.devnull, "w") as nowhere,
+        contextlib.redirect_stdout(nowhere),
+        contextlib.redirect_stderr(nowhere),
+    ):
+        yield
