@@ -1,1 +1,1 @@
-"""Demonstrations: each module learns you one thing, has `run()` for numbers and `main()` for files."""
+"""Demonstrations: each module teaches one thing; `run()` gives numbers, `main()` files."""

@@ -57,9 +57,7 @@ def run(dx: float = 0.25, ny: int = 8, until: float = 45.0) -> tuple[fx.Scene, l
         row = history.at("a[bond]", a, event="onset")
         load = BEAM.dcb_load(row["a[bond]"], G_IC)
         opening = BEAM.dcb_opening(row["a[bond]"], load)
-        rows.append(
-            [row["a[bond]"], 2.0 * row["u[pin_top.y]"], row["R[pin_top.y]"], opening, load]
-        )
+        rows.append([row["a[bond]"], 2.0 * row["u[pin_top.y]"], row["R[pin_top.y]"], opening, load])
     return scene, rows
 
 

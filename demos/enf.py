@@ -20,9 +20,7 @@ from fxcrack.meshes.enf import enf_2d
 
 G_IIC = 0.774
 BEAM = CorrectedBeam(E=161e3, E22=11.38e3, G=5.2e3, h=2.25, b=25.4)
-ARMS = fx.Orthotropic(
-    E=(161e3, 11.38e3, 11.38e3), nu=(0.32, 0.32, 0.45), G=(5.2e3, 5.2e3, 3.9e3)
-)
+ARMS = fx.Orthotropic(E=(161e3, 11.38e3, 11.38e3), nu=(0.32, 0.32, 0.45), G=(5.2e3, 5.2e3, 3.9e3))
 
 
 def run(

@@ -22,7 +22,9 @@ RATE = 4.0 * (1.0 - NU**2) * PRESSURE**2 * RADIUS / (np.pi * E)
 OPENING = 8.0 * (1.0 - NU**2) * PRESSURE * RADIUS / (np.pi * E)
 
 
-def run(dr: float = 0.05, order: int = 1, method: str = "vcct") -> tuple[fx.Scene, dict[str, float]]:
+def run(
+    dr: float = 0.05, order: int = 1, method: str = "vcct"
+) -> tuple[fx.Scene, dict[str, float]]:
     """Onset of growth: computed G and opening over the exact ones."""
     mesh = penny(a=RADIUS, radius=30.0 * RADIUS, half_height=30.0 * RADIUS, dr=dr, order=order)
     bond = fx.Interface(

@@ -12,9 +12,7 @@ from types import TracebackType
 from mpi4py import MPI
 
 
-def _abort(
-    kind: type[BaseException], error: BaseException, trace: TracebackType | None
-) -> None:
+def _abort(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Print the error and end all ranks."""
     comm = MPI.COMM_WORLD
     sys.stdout.flush()

@@ -49,7 +49,7 @@ class CorrectedBeam:
         factor = 3.0 - 2.0 * (gamma / (1.0 + gamma)) ** 2
         return float(np.sqrt(self.E / (11.0 * self.G) * factor))
 
-    # -- double cantilever beam ------------------------------------------------------------------
+    # -- double cantilever beam ----------------------------------------------------------
 
     def dcb_load(self, a: Number, toughness: float) -> Number:
         """Load at which a double cantilever beam grows from crack length a."""
@@ -66,7 +66,7 @@ class CorrectedBeam:
         length = np.sqrt(1.5 * self.E * self.inertia * opening / strength)
         return strength / length  # type: ignore[no-any-return]
 
-    # -- bending specimens --------------------------------------------------------------------------
+    # -- bending specimens ---------------------------------------------------------------
 
     def enf_load(self, a: Number, toughness: float) -> Number:
         """Load at which an end-notched flexure specimen grows."""

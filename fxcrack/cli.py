@@ -12,6 +12,7 @@ import importlib
 import importlib.metadata
 import importlib.util
 import json
+import logging
 import os
 import platform
 import sys
@@ -55,7 +56,7 @@ def _console() -> Console:
     return Console(quiet=MPI.COMM_WORLD.rank > 0, highlight=False)
 
 
-# -- demos -------------------------------------------------------------------------------------------
+# -- demos -----------------------------------------------------------------------------------------
 
 
 def demo_titles() -> dict[str, str]:
@@ -65,8 +66,10 @@ def demo_titles() -> dict[str, str]:
     titles = {}
     for folder in folders or []:
         for path in sorted(Path(folder).glob("[!_]*.py")):
-            lines = [line.strip("#\"' ") for line in path.read_text(encoding="utf-8").splitlines()]
-            titles[path.stem] = next((t for t in lines if t and t[0].isalpha()), "")
+            text = path.read_text(encoding="utf-8")
+            if "\ndef main(" in text:
+                lines = (line.strip("#\"' ") for line in text.splitlines())
+                titles[path.stem] = next((t for t in lines if t[:1].isalpha()), "")
     return titles
 
 
@@ -94,7 +97,7 @@ def demo(
     module.main(Path("out") / name if out is None else out, fine=fine)
 
 
-# -- benchmarks --------------------------------------------------------------------------------------
+# -- benchmarks ------------------------------------------------------------------------------------
 
 
 @app.command()
@@ -124,7 +127,7 @@ def bench(
             temporary.write_text(json.dumps(result, indent=1) + "\n")
 
 
-# -- information -------------------------------------------------------------------------------------
+# -- information -----------------------------------------------------------------------------------
 
 
 def information() -> dict[str, str]:
@@ -171,7 +174,7 @@ def info() -> None:
     _console().print(table)
 
 
-# -- errors and ranks --------------------------------------------------------------------------------
+# -- errors and ranks ------------------------------------------------------------------------------
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -184,20 +187,36 @@ def main(argv: Sequence[str] | None = None) -> None:
         SystemExit: Always; with code 0, 1 (an error of fxcrack) or 2 (wrong words).
     """
     words = list(sys.argv[1:] if argv is None else argv)
+    # its own communicator: nothing a failed command left unfinished can mix with it
+    comm = MPI.COMM_WORLD.Dup()
     code: Any = 0
+    message = ""
     try:
         with _only_rank_0_prints():
-            log.show()
+            log.show(logging.WARNING)
             get_command(app)(words, prog_name="fxcrack")
     except FxcrackError as error:
-        code = 1
-        if MPI.COMM_WORLD.rank == 0 or not _all_here():
-            print(f"fxcrack: {error}", file=sys.stderr, flush=True)
+        code, message = 1, f"fxcrack: {error}"
     except SystemExit as end:
         code = end.code
-    if code and not _all_here():
-        MPI.COMM_WORLD.Abort(code if isinstance(code, int) else 1)
+    if code:
+        together = _all_failed(comm)
+        if message and (comm.rank == 0 or not together):
+            print(message, file=sys.stderr, flush=True)
+        if not together:
+            comm.Abort(code if isinstance(code, int) else 1)
     sys.exit(code)
+
+
+def _all_failed(comm: MPI.Intracomm) -> bool:
+    """Whether all ranks call this within seconds; collective if they do."""
+    deadline = time.monotonic() + _PATIENCE
+    arrived = comm.Ibarrier()
+    while not arrived.Test():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.001)
+    return True
 
 
 @contextlib.contextmanager

@@ -96,7 +96,7 @@ class Displacement:
         """Refuse a support that supports nothing."""
         if self.x is None and self.y is None and self.z is None:
             raise InputError(
-                f"Displacement('{self.where}') prescribes no component; give x, y or z (0.0 holds it)"
+                f"Displacement('{self.where}') prescribes nothing; give x, y or z (0.0 holds it)"
             )
 
     @property

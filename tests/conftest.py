@@ -76,6 +76,7 @@ def _wait_for_all(item: pytest.Item, report: pytest.TestReport) -> None:
             ).global_and_fixture_disabled():
                 print(f"\n{item.nodeid} failed on rank {WORLD.rank}, others hang", file=sys.stderr)
                 print(report.longreprtext, file=sys.stderr, flush=True)
+            time.sleep(0.5)  # what is printed must leave the process before mpirun ends it
             WORLD.Abort(1)
         time.sleep(0.001)  # leave the core to ranks that still work
 

@@ -149,8 +149,10 @@ def test_limit_of_cycles() -> None:
     assert (jump.cycles, jump.event) == (500.0, "limit")
     assert not jump.release.any() and jump.initiated.all()
     assert jump.credit == pytest.approx([100.0 * 0.00125])  # onset at 400
-    exact = cycle_jump(LAW, [0.5], [0.5], 1.0, 0.25, limit=jump.cycles + 200.0, **DONE)
-    assert exact.event == "growth"
+    # A release just at the limit still happens.
+    free = cycle_jump(LAW, [0.5], [0.5], 1.0, 0.25)
+    exact = cycle_jump(LAW, [0.5], [0.5], 1.0, 0.25, limit=free.cycles)
+    assert exact.event == "growth" and exact.cycles == free.cycles
     unstable = cycle_jump(LAW, [0.9], [0.9], 1.0, 0.25, cycles=9.5, limit=10.0)
     assert (unstable.cycles, unstable.event) == (10.0, "limit") and not unstable.release.any()
 

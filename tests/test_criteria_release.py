@@ -85,6 +85,7 @@ def test_secant_unloading(w: Array, largest: Array, end: Array) -> None:
     assert ((f >= 0.0) & (f <= linear_fraction(largest, end))).all()
     # On the envelope while it opens; a line to the origin below; nothing when closed again.
     np.testing.assert_array_equal(secant_fraction(w, w, end), linear_fraction(w, end))
+    np.testing.assert_array_equal(secant_fraction(w, 0.0 * w, end), linear_fraction(w, end))
     half = secant_fraction(0.5 * largest, largest, end)
     opened = largest > 0.0
     np.testing.assert_allclose(half[opened], 0.5 * linear_fraction(largest, end)[opened])

@@ -94,7 +94,7 @@ class Growth:
 
 
 def grow(problem: Problem, mesh: Mesh) -> tuple[Growth, Scene]:
-    """Grow the crack from a = 30 to the onset at a = 60; collective; the caller closes the scene."""
+    """Grow the crack from a = 30 to the onset at a = 60; collective; close the scene afterwards."""
     comm = mesh.comm
     comm.Barrier()
     begin = time.perf_counter()
@@ -117,7 +117,7 @@ def grow(problem: Problem, mesh: Mesh) -> tuple[Growth, Scene]:
 
 
 def mumps_cholesky(matrix: PETSc.Mat) -> PETSc.PC:
-    """MUMPS' Cholesky factorisation of a positive definite matrix, not yet done; ``setUp`` does it."""
+    """A Cholesky factorisation by MUMPS, which the result's ``setUp`` performs."""
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.PC().create(matrix.getComm())
@@ -213,9 +213,7 @@ def _in_own_processes(problem: Problem, ranks: int) -> float | None:
         if launcher is None:
             return None
         command = [launcher, "-n", str(ranks), *command]
-    environment = {
-        k: v for k, v in os.environ.items() if k in _KEPT or not k.startswith(_LAUNCHER)
-    }
+    environment = {k: v for k, v in os.environ.items() if k in _KEPT or not k.startswith(_LAUNCHER)}
     # more ranks than cores are allowed, also in Open MPI (4 and 5)
     environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
     environment["PRTE_MCA_rmaps_default_mapping_policy"] = ":oversubscribe"

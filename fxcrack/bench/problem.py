@@ -2,19 +2,16 @@
 
 Two arms 100 x 1.5, E 70e3, nu 0.3, G_Ic 0.2 (N, mm, MPa). "dcb2d": plane strain, bilinear
 quadrilaterals, opened at the outer corners of the arm ends. "dcb3d": 20 wide, trilinear
-hexahedra, far end clamped, end faces moved. Corrected beam theory, with b the width,
-I = b h^3/12, c = a + chi h (Williams 1989):
-
-    P = sqrt(G_c b E I)/c,      opening = 2 P c^3/(3 E I)
+hexahedra, far end clamped, end faces moved.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
 from mpi4py import MPI
 
+from fxcrack.beams import CorrectedBeam
 from fxcrack.criteria import VCCT
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface
@@ -98,9 +95,12 @@ class Problem:
 
     def mesh(self, comm: MPI.Intracomm) -> Mesh:
         """Make the mesh; collective."""
+        mesh: Mesh
         if self.is_3d:
-            return dcb_3d(comm, dx=self.dx, dy=self.dy, ny=self.ny, width=_WIDTH)
-        return dcb_2d(comm, dx=self.dx, ny=self.ny)
+            mesh = dcb_3d(comm, dx=self.dx, dy=self.dy, ny=self.ny, width=_WIDTH)
+        else:
+            mesh = dcb_2d(comm, dx=self.dx, ny=self.ny)
+        return mesh
 
     def scene(self, mesh: Mesh) -> Scene:
         """Material, supports and the bonded interface "bond" on a mesh; collective."""
@@ -149,13 +149,10 @@ class Problem:
 
     def beam_load(self, opening: float) -> float:
         """Load of corrected beam theory at an opening while the crack grows, force."""
-        width = _WIDTH if self.is_3d else 1.0
         modulus = _E if self.is_3d else _E / (1.0 - _NU**2)
-        stiffness = modulus * width * _HEIGHT**3 / 12.0
-        return float(
-            np.sqrt(_GC * width * stiffness)
-            / np.sqrt(1.5 * stiffness * opening / np.sqrt(_GC * width * stiffness))
-        )
+        width = _WIDTH if self.is_3d else 1.0
+        beam = CorrectedBeam(E=modulus, E22=modulus, G=0.5 * _E / (1.0 + _NU), h=_HEIGHT, b=width)
+        return beam.dcb_load_at_opening(opening, _GC)
 
     def reference(self) -> dict[float, tuple[float | None, float]]:
         """Known openings and loads at onset by crack length; empty for other sizes."""

@@ -221,7 +221,7 @@ def cycle_jump(
         moving = regime == Regime.PARIS
         grown[moving] += rate[moving] * np.maximum(jump - wait[moving], 0.0)
         grown[release] = 0.0
-    onset_over |= release | ((regime == Regime.PARIS) & (wait <= jump) & (event != "arrest"))
+    onset_over |= release | ((regime == Regime.PARIS) & (wait <= jump))
     return CycleJump(
         cycles=cycles + jump,
         event=event,

@@ -116,8 +116,7 @@ def resolve(
                 f"{owner}: {name} depends on temperature, but the scene has none; "
                 "give the scene a temperature, or the property as a number"
             )
-        t = np.broadcast_to(np.asarray(temperature, dtype=np.float64), (n,))
-        result = np.where(np.isnan(t), np.nan, value.at(t))
+        result = np.broadcast_to(value.at(temperature), (n,))
     elif callable(value):
         result = np.asarray(value(np.asarray(x, dtype=np.float64)), dtype=np.float64)
         if result.shape not in ((), (n,)):

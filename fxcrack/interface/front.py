@@ -261,7 +261,7 @@ class Front:
         length = float(np.linalg.norm(total))
         if length < 1e-6 * max(scale, 1e-300):
             # open on all sides: grow away from the first open neighbour
-            behind = [k for k in self.neighbours(node) if not self.bonded[k]][0]
+            behind = next(k for k in self.neighbours(node) if not self.bonded[k])
             total = s.x[node] - s.x[behind]
             total -= (total @ normal) * normal
             length = float(np.linalg.norm(total))

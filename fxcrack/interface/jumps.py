@@ -303,7 +303,7 @@ def _unshared_support(
     """A support of a slave node that its masters do not carry in the same way."""
     masters = replica.find(pair.masters[node][pair.weights[node] != 0.0])
     for c in np.flatnonzero(replica.which[slave] >= 0):
-        column = supports.columns[replica.which[slave, c]]
+        column: SupportColumn = supports.columns[int(replica.which[slave, c])]
         for m in masters:
             k = replica.which[m, c]
             if k < 0 or not _moves_alike(
@@ -335,9 +335,7 @@ def build_coordinates(
     """
     gdim, comm = continuum.gdim, continuum.comm
     # a node whose jump is free and of no interest keeps its own displacement
-    jumped = [
-        p.paired & (r != INNER).any(axis=1) for p, r in zip(pairs, roles, strict=True)
-    ]
+    jumped = [p.paired & (r != INNER).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
     replica = _Replica(continuum, pairs, supports, jumped)
     _check_slaves(pairs, jumped, replica, supports)
     slaves = [replica.find(p.surface.dofs) for p in pairs]
@@ -359,8 +357,7 @@ def build_coordinates(
         gdim,
     )
     roles = [
-        np.where(h | ~j[:, None], HELD, r)
-        for r, h, j in zip(roles, held, jumped, strict=True)
+        np.where(h | ~j[:, None], HELD, r) for r, h, j in zip(roles, held, jumped, strict=True)
     ]
 
     # which owned dof slots have a column of their own

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.continuum import Continuum
-from fxcrack.errors import InterfaceError, InputError
+from fxcrack.errors import InputError, InterfaceError
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface, gather_surface
 

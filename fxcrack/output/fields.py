@@ -32,6 +32,7 @@ from fxcrack.output.atomic import replacing
 from fxcrack.output.collective import together
 from fxcrack.output.history import Row
 from fxcrack.output.vtu import FACETS, Grid, write_grid, write_header, write_series
+from fxcrack.steps.evaluate import TipValues
 
 if TYPE_CHECKING:
     from fxcrack.scene import Scene
@@ -52,9 +53,10 @@ class InterfaceFields:
         normal: Unit vectors from master to slave, shape (n_nodes, 3).
         state: 1 bonded, 0 open, -1 no master beneath, shape (n_nodes,).
         front: 1 on front nodes, shape (n_nodes,).
-        rates: G I, II, III at front nodes of a growing crack, 0 elsewhere, shape (n_nodes, 3),
-            force/length.
-        f: Criterion there, shape (n_nodes,).
+        release_time: Time at which a node was released, 0 if it was open from the start, NaN while
+            it is bonded, shape (n_nodes,).
+        at_front: What the criterion says at the front nodes, 0 elsewhere, each of shape (n_nodes,):
+            f, and what is behind it, as GI, GII, GIII and their sum G (force/length).
     """
 
     displacement: Array
@@ -63,8 +65,8 @@ class InterfaceFields:
     normal: Array
     state: npt.NDArray[np.int32]
     front: npt.NDArray[np.int32]
-    rates: Array
-    f: Array
+    release_time: Array
+    at_front: dict[str, Array]
 
 
 def displacement_function(scene: Scene) -> fem.Function:
@@ -127,12 +129,15 @@ def _in_space(values: Array) -> Array:
     return np.pad(values, ((0, 0), (0, 3 - values.shape[1])))
 
 
-def interface_fields(scene: Scene, u: fem.Function) -> list[InterfaceFields]:
+def interface_fields(
+    scene: Scene, u: fem.Function, time: float | None = None
+) -> list[InterfaceFields]:
     """Fields on every interface of the scene, in the order of ``scene.pairs``; collective.
 
     Args:
         scene: The scene.
         u: Its displacement, from :func:`displacement_function`.
+        time: Time of the present state; that of the scene by default.
     """
     continuum, pairs = scene.continuum, scene.pairs
     used = [np.concatenate([p.surface.dofs, p.masters.ravel()]) for p in pairs]
@@ -158,12 +163,15 @@ def interface_fields(scene: Scene, u: fem.Function) -> list[InterfaceFields]:
             motion[slaves[p]],
             motion[masters[p]],
             np.where(acting[p][:, None], total[slaves[p]], 0.0),
+            scene.time if time is None else time,
         )
         for p in range(len(pairs))
     ]
 
 
-def _fields_of(scene: Scene, p: int, slave: Array, masters: Array, force: Array) -> InterfaceFields:
+def _fields_of(
+    scene: Scene, p: int, slave: Array, masters: Array, force: Array, time: float
+) -> InterfaceFields:
     """Fields on pair p from the displacements and forces at its nodes."""
     pair, model = scene.pairs[p], scene.model
     surface = pair.surface
@@ -176,14 +184,16 @@ def _fields_of(scene: Scene, p: int, slave: Array, masters: Array, force: Array)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
     state = np.where(pair.paired, model.fronts[p].bonded.astype(np.int32), -1)
     front = np.zeros(surface.n_nodes, dtype=np.int32)
-    rates, f = np.zeros((surface.n_nodes, 3)), np.zeros(surface.n_nodes)
+    when = np.where(model.fronts[p].bonded, np.nan, 0.0)
+    at_front: dict[str, Array] = {}
     for growth in scene.growths:
         if growth.p == p:
             tips = growth.tips()
             front[tips.node] = 1
+            for node, moment in growth.released:
+                when[node] = moment
             if model.active[p]:
-                values = growth.evaluate(tips, model.state)
-                rates[tips.node], f[tips.node] = values.rates, values.f
+                at_front = _at_front(growth.evaluate(tips, model.state, time), surface.n_nodes)
     return InterfaceFields(
         displacement=_in_space(slave),
         opening=_in_space(opening),
@@ -191,9 +201,21 @@ def _fields_of(scene: Scene, p: int, slave: Array, masters: Array, force: Array)
         normal=_in_space(pair.frames[:, :, 0]),
         state=state.astype(np.int32),
         front=front,
-        rates=rates,
-        f=f,
+        release_time=when,
+        at_front=at_front,
     )
+
+
+def _at_front(values: TipValues, n_nodes: int) -> dict[str, Array]:
+    """Values at the tips as arrays over all slave nodes."""
+    report = {"f": values.f, **values.report}
+    modes = [values.report[mode] for mode in ("GI", "GII", "GIII") if mode in values.report]
+    if modes:
+        report["G"] = np.sum(modes, axis=0)
+    out = {name: np.zeros(n_nodes) for name in report}
+    for name, value in report.items():
+        out[name][values.tips.node] = value
+    return out
 
 
 # -- grids -----------------------------------------------------------------------------------------
@@ -242,9 +264,8 @@ def interface_grid(pair: Pair, fields: InterfaceFields) -> Grid:
             "normal": fields.normal,
             "bond_state": fields.state,
             "front": fields.front,
-            "G": fields.rates.sum(axis=1),
-            **{f"G{'I' * (i + 1)}": fields.rates[:, i].copy() for i in range(3)},
-            "f": fields.f,
+            "release_time": fields.release_time,
+            **fields.at_front,
         },
     )
 
@@ -330,7 +351,7 @@ class FieldSeries:
         bodies = body_grid(scene, u)
         surfaces = [
             interface_grid(pair, fields)
-            for pair, fields in zip(scene.pairs, interface_fields(scene, u), strict=True)
+            for pair, fields in zip(scene.pairs, interface_fields(scene, u, time), strict=True)
         ]
         task, folder = f"writing fields to '{self.path}'", ""
         with together(comm, task):

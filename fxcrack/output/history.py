@@ -43,6 +43,11 @@ class History:
         self.reason = ""
         self.details: dict[str, Any] = {}
 
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator; rank 0 writes files."""
+        return self._comm
+
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.rows)
@@ -96,3 +101,29 @@ class History:
             with replacing(path) as temporary:
                 temporary.write_text(json.dumps(content, indent=1))
         self._comm.Barrier()
+
+    def plot(
+        self,
+        path: str | Path,
+        *,
+        x: str | npt.ArrayLike | None = None,
+        y: str | npt.ArrayLike | None = None,
+        **options: Any,
+    ) -> None:
+        """Plot load against opening; collective.
+
+        Args:
+            path: Picture file (.png, .pdf, .svg).
+            x: Column or array with one value per row; by default the first prescribed
+                displacement that moves, absolute value.
+            y: Column or array; by default the reaction that belongs to it, absolute value.
+            **options: As for :func:`fxcrack.output.plots.load_opening`: reference curves
+                ``[(label, x, y)]``, xlabel, ylabel, label, title.
+
+        Raises:
+            InputError: A column is unknown, or there is none to choose.
+            FxcrackError: The file could not be written.
+        """
+        from fxcrack.output import plots  # takes long to import: only those who plot wait
+
+        plots.load_opening(self, path, x=x, y=y, **options)

@@ -56,9 +56,7 @@ def border_vectors(
             )
         nodes = continuum.owned_nodes(monitor.where)
         count = continuum.comm.allreduce(len(nodes))
-        vector = PETSc.Vec().createMPI(
-            (continuum.n_local, continuum.n_global), comm=continuum.comm
-        )
+        vector = PETSc.Vec().createMPI((continuum.n_local, continuum.n_global), comm=continuum.comm)
         for i, component in enumerate(monitor.direction):
             vector.array[continuum.gdim * nodes + i] = component / count
         out.append(vector)

@@ -21,7 +21,7 @@ from fxcrack.interface.jumps import WINDOW, Supports, build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
-from fxcrack.solve.jump_system import Equilibrium, JumpSystem
+from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
 from fxcrack.solve.window import CostModel, choose_roles
 
 Array = npt.NDArray[np.float64]
@@ -82,6 +82,7 @@ class CondensedModel:
         self.n_loads = len(supports.columns) + len(loads)
         self.active = [False] * len(pairs)
         self.reach = [np.inf] * len(pairs)
+        self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
         self._stiffness: PETSc.Mat | None = None
@@ -90,7 +91,7 @@ class CondensedModel:
         self.system: JumpSystem
         self.state: Equilibrium
 
-    # -- the window ------------------------------------------------------------------------------
+    # -- the window ----------------------------------------------------------------------
 
     def prepare(self, active: list[bool], reach: list[float]) -> None:
         """Build the window for a step; collective.
@@ -121,6 +122,7 @@ class CondensedModel:
             self.active,
             reach,
             self._cost,
+            around=self.around,
             cap_mb=self.options.window_mb,
             gdim=self.continuum.gdim,
         )
@@ -172,33 +174,35 @@ class CondensedModel:
         normals = index[~front.bonded & pair.paired, 0]
         self.system.contact[normals[normals >= 0]] = True
 
-    def require_tips(self, tips: list[Tips | None]) -> bool:
-        """Make sure the window holds all the tips need, factoring again if not; collective.
+    def holds(self, p: int, nodes: Ints) -> bool:
+        """Whether the window holds all jumps of some slave nodes that may differ from zero."""
+        pair, index, held = self.pairs[p], self.index[p], self.held_by_supports[p]
+        missing = (index[nodes] < 0) & ~held[nodes]
+        if pair.interface.normal_only:
+            missing[:, 1:] = False
+        missing[~pair.paired[nodes]] = False
+        return not missing.any()
 
-        Returns:
-            Whether a new factorisation was made; the state then has to be solved for again.
+    def rebase(self) -> None:
+        """Factor again around the present fronts; the state is solved for anew; collective.
+
+        Given forces are lost: the caller sets them again (see :meth:`solve`).
         """
-        for pair, index, held, tip in zip(
-            self.pairs, self.index, self.held_by_supports, tips, strict=True
-        ):
-            if tip is None or not len(tip):
-                continue
-            nodes = np.concatenate([tip.force_nodes.ravel(), tip.wake_nodes.ravel()])
-            missing = (index[nodes] < 0) & ~held[nodes]
-            if pair.interface.normal_only:
-                missing[:, 1:] = False
-            missing[~pair.paired[nodes]] = False
-            if missing.any():
-                self.rebases += 1
-                loads, force = self.state.loads, self.state.force
-                if force.any():
-                    raise RuntimeError("a rebase while forces ramp down must carry them over")
-                self._rebase()
-                self.state = self.system.equilibrium(loads, np.zeros(self.system.n_window))
-                return True
-        return False
+        self.rebases += 1
+        loads = self.state.loads
+        self._rebase()
+        self.state = Equilibrium(
+            loads,
+            np.zeros(self.system.n_window),
+            np.zeros(self.system.n_window),
+            np.zeros(self.n_loads),
+        )
 
-    # -- quantities at the tips --------------------------------------------------------------------
+    def solve(self, force: Array) -> None:
+        """Find the equilibrium at the present loads with given forces, shape (n_window,)."""
+        self.state = self.system.equilibrium(self.state.loads, force)
+
+    # -- quantities at the tips ----------------------------------------------------------
 
     def vectors(self, p: int, nodes: Ints, values: Array) -> Array:
         """Jump or force components at slave nodes as global vectors.
@@ -291,44 +295,53 @@ class CondensedModel:
             out[i, : len(nodes)] = world @ tips.frame[i]
         return out
 
-    # -- letting go ----------------------------------------------------------------------------------
+    # -- letting go ----------------------------------------------------------------------
 
     def components(self, p: int, nodes: Ints) -> Ints:
         """Window components of slave nodes."""
         index = self.index[p][nodes]
         return index[index >= 0]
 
-    def release(self, p: int, nodes: Ints) -> float:
-        """Let nodes go at constant load and find the new equilibrium.
-
-        Returns:
-            Energy set free by the bond forces on their way to zero.
+    def open(self, p: int, nodes: Ints) -> None:
+        """Make the forces of nodes known instead of their jumps; they keep their values.
 
         Raises:
             NotPositiveDefinite: A body would come free; nothing is changed.
         """
-        system, before = self.system, self.state
+        system, state = self.system, self.state
         components = self.components(p, nodes)
         components = components[~system.free[components]]
-        forces = system.forces(before, components)
+        force = state.force.copy()
+        force[components] = system.forces(state, components)
         system.release(components)
         self.fronts[p].release(nodes)
         if self.pairs[p].interface.contact:
             self._let_touch(self.pairs[p], self.fronts[p], self.index[p])
-        held = before.force.copy()
-        held[components] = forces
-        start = Equilibrium(before.loads, held, before.jump, before.conjugate)
-        released = 0.0
-        last, last_force = start, forces
-        for _, point in system.pieces(start, before.loads, before.force):
-            now = point.force[components]
-            opened = point.jump[components] - last.jump[components]
-            released -= 0.5 * float((now + last_force) @ opened)
-            last, last_force = point, now
+        self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
+
+    def release(self, p: int, nodes: Ints, force: Array) -> float:
+        """Let nodes go at constant load and find the new equilibrium.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes.
+            force: Given forces afterwards, shape (n_window,).
+
+        Returns:
+            Energy set free by the bond forces on their way.
+
+        Raises:
+            NotPositiveDefinite: A body would come free; nothing is changed.
+        """
+        self.open(p, nodes)
+        released, last = 0.0, self.state
+        for _, point in self.system.pieces(last, last.loads, force):
+            released += bond_work(last, point)
+            last = point
         self.state = last
         return released
 
-    # -- the way back to fields ------------------------------------------------------------------------
+    # -- the way back to fields ----------------------------------------------------------
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Displacement vector of a state; collective; the caller destroys it."""

@@ -80,7 +80,7 @@ class JumpSystem:
         self._forward = np.zeros((0, n_loads))
         self._unit: Array | None = None
 
-    # -- states --------------------------------------------------------------------------------
+    # -- states --------------------------------------------------------------------------
 
     def release(self, components: Ints) -> None:
         """Free components; their forces are given from now on.
@@ -108,7 +108,7 @@ class JumpSystem:
         )
         self._unit = None
 
-    # -- equilibrium with given states -----------------------------------------------------------
+    # -- equilibrium with given states ---------------------------------------------------
 
     def _response(self) -> Array:
         """Jumps of the free components per unit load, shape (n_free, n_loads)."""
@@ -151,7 +151,7 @@ class JumpSystem:
         interface = state.jump[rows] @ self.forces(state, rows) if len(rows) else 0.0
         return 0.5 * float(interface + state.loads @ state.conjugate)
 
-    # -- contact -----------------------------------------------------------------------------------
+    # -- contact -------------------------------------------------------------------------
 
     def _violations(self, state: Equilibrium) -> tuple[Bools, Array, Array]:
         """Contact components on the wrong side; gaps; pressures of the closed ones."""
@@ -276,9 +276,7 @@ class JumpSystem:
             self._switch(changing)
             here, last = at, point
 
-    def _first_change(
-        self, last: Equilibrium, wrong: Bools, gap: Array, pressure: Array
-    ) -> Array:
+    def _first_change(self, last: Equilibrium, wrong: Bools, gap: Array, pressure: Array) -> Array:
         """Fraction of the step at which each wrong component changes, inf elsewhere."""
         out = np.full(self.n_window, np.inf)
         for c in np.flatnonzero(wrong):
@@ -303,3 +301,8 @@ def work_between(a: Equilibrium, b: Equilibrium, n_forces: int) -> float:
     by_supports = 0.5 * (a.conjugate + b.conjugate)[:n] @ (b.loads - a.loads)[:n]
     by_forces = 0.5 * (a.loads + b.loads)[n:] @ (b.conjugate - a.conjugate)[n:]
     return float(by_supports + by_forces)
+
+
+def bond_work(a: Equilibrium, b: Equilibrium) -> float:
+    """Energy bonds that are letting go take out along a linear piece."""
+    return -0.5 * float((a.force + b.force) @ (b.jump - a.jump))

@@ -78,6 +78,7 @@ def choose_roles(
     reach: list[float],
     cost: CostModel,
     *,
+    around: list[tuple[float, float]],
     cap_mb: float,
     gdim: int,
 ) -> list[npt.NDArray[np.int8]]:
@@ -89,6 +90,7 @@ def choose_roles(
         active: Whether the crack may grow in each.
         reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
         cost: Cost model.
+        around: Distances ahead of and behind the tips that the criterion looks at, per pair.
         cap_mb: Memory S may take, MB.
         gdim: Dimension.
 
@@ -98,6 +100,7 @@ def choose_roles(
     roles, waiting = [], []
     n_fixed = 0
     for p, (pair, front, on, far) in enumerate(zip(pairs, fronts, active, reach, strict=True)):
+        ahead, behind = around[p]
         role = np.full((pair.surface.n_nodes, gdim), INNER, dtype=np.int8)
         bonded = front.bonded & pair.paired
         role[bonded, 0] = HELD
@@ -110,9 +113,15 @@ def choose_roles(
             x = pair.surface.x
             tips = front.candidates()
             wake = _rings(front, tips, WAKE_ROWS * front.surface.order)
-            role[wake & is_open] = WINDOW
             distance, _ = cKDTree(x[tips] if len(tips) else x[is_open]).query(x)
+            margin = 2.0 * front.surface.facet_size
+            if behind > 0.0:
+                wake |= distance <= behind + margin
+            role[wake & is_open] = WINDOW
             near = _rings(front, tips, 2 * front.surface.order) & bonded
+            if ahead > 0.0:
+                near |= bonded & (distance <= ahead + margin)
+                far = far + ahead + margin
             role[near] = _window_of(pair, role[near])
             rest = np.flatnonzero(bonded & ~near & (distance <= far))
             rest = rest[np.lexsort((rest, distance[rest]))]

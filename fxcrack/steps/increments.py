@@ -1,6 +1,6 @@
 """Increment control as a pure object: grow, cut back, give up.
 
-    accepted: dt <- min(dt growth, maximum)      rejected: dt <- dt cutback
+accepted: dt <- min(dt growth, maximum)      rejected: dt <- dt cutback
 """
 
 from __future__ import annotations

@@ -18,13 +18,16 @@ from fxcrack.errors import InputError
 from fxcrack.output.history import History, Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
-from fxcrack.solve.jump_system import Equilibrium, blend, work_between
-from fxcrack.steps.growth import Growth, TipValues
+from fxcrack.solve.jump_system import Equilibrium, blend, bond_work, work_between
+from fxcrack.steps.evaluate import TipValues
+from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
+from fxcrack.steps.letting_go import TimedRelease
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength, Releases, Time
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 Observer = Callable[[str, Row], None]
 
 _LARGE = 1e60
@@ -71,8 +74,9 @@ class March:
         self._names = self._column_names()
         self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=_LARGE)
         self._values: list[TipValues] = []
+        self._ramps: list[TimedRelease] = []
 
-    # -- the three ways to step --------------------------------------------------------------------
+    # -- the three ways to step ----------------------------------------------------------
 
     def run(self) -> str:
         """March until an end condition holds; returns why the step ended."""
@@ -150,19 +154,18 @@ class March:
             self._values = values
             self._record("increment")
             control.accepted()
-            while max(self._largest()) >= 1.0 and not self._ended():
-                unstable = max(self._largest())
+            while self._any_ready() and not self._ended():
                 self._let_go(all_ready=True)
-                if max(self._largest()) < 1.0 or not self._may_run_on(unstable):
+                if not self._may_run_on():
                     break
 
-    # -- moving along the load ------------------------------------------------------------------------
+    # -- moving along the load -----------------------------------------------------------
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
-        self._undo_state = (self.time, self.model.state, self.work)
+        self._undo_state = (self.time, self.model.state, self.work, self.released)
         return list(
             self.model.system.pieces(
-                self.model.state, self.loads_at(target), np.zeros(self.model.system.n_window)
+                self.model.state, self.loads_at(target), self._force_at(target)
             )
         )
 
@@ -170,17 +173,29 @@ class March:
         n_forces = len(self.model.loads)
         for _, point in pieces:
             self.work += work_between(self.model.state, point, n_forces)
+            self.released += bond_work(self.model.state, point)
             self.model.state = point
         self.time = target
 
     def _undo(self, closed: npt.NDArray[np.bool_]) -> float:
-        self.time, self.model.state, self.work = self._undo_state
+        self.time, self.model.state, self.work, self.released = self._undo_state
         self.model.system._set_closed(closed)
         return self.time
 
     def _breaks_ahead(self) -> list[float]:
         small = 1e-12 * abs(self.time)
-        return [b for b in self.breaks if b > self.time + small]
+        own = [t for ramp in self._ramps for t in ramp.breaks()]
+        own += [t for g in self.growths for t in g.evaluator.breaks()]
+        return [b for b in (*self.breaks, *own) if b > self.time + small]
+
+    def _force_at(self, time: float) -> Array:
+        """Given forces of bonds that are letting go with time, shape (n_window,)."""
+        force = np.zeros(self.model.system.n_window)
+        for ramp in self._ramps:
+            components = self.model.index[ramp.p][ramp.nodes]
+            inside = components >= 0
+            force[components[inside]] = ramp.fraction(time) * ramp.force[inside]
+        return force
 
     def _load_to_event(self) -> bool:
         """Load until f = 1 somewhere, an amplitude bends or the end time comes.
@@ -205,7 +220,7 @@ class March:
         """A time a little after the one at which f would reach 1 under a proportional load."""
         f = max(self._largest())
         if f > 0.0 and self.time > 0.0:
-            return self.time * min(1.02 / np.sqrt(min(f, 1.0)), 1e3)
+            return float(self.time * min(1.02 / np.sqrt(min(f, 1.0)), 1e3))
         return max(1.0, 2.0 * self.time)
 
     def _unload_to_event(self) -> None:
@@ -221,13 +236,12 @@ class March:
         system, n_forces = self.model.system, len(self.model.loads)
         begin = self.time
         tips = [v.tips for v in self._values]
-        path = system.pieces(
-            self.model.state, self.loads_at(target), np.zeros(system.n_window)
-        )
+        path = system.pieces(self.model.state, self.loads_at(target), self._force_at(target))
         for fraction, point in path:
             here = self.model.state
+            times = (self.time, begin + fraction * (target - begin))
             found = [
-                g.crossing(t, here, point, upward=upward)
+                g.crossing(t, here, point, times, upward=upward)
                 for g, t in zip(self.growths, tips, strict=True)
             ]
             hits = [x for x in found if x is not None]
@@ -239,12 +253,11 @@ class March:
                 hit = None if None in waiting else max(hits, default=None)
             if hit is not None:
                 point = blend(here, point, hit)
-                start = self.time
-                end = begin + fraction * (target - begin)
-                self.time = start + hit * (end - start)
+                self.time = times[0] + hit * (times[1] - times[0])
             else:
-                self.time = begin + fraction * (target - begin)
+                self.time = times[1]
             self.work += work_between(here, point, n_forces)
+            self.released += bond_work(here, point)
             self.model.state = point
             if hit is not None:
                 self._values = self._evaluate()
@@ -253,77 +266,78 @@ class March:
         self._values = self._evaluate()
         return False
 
-    # -- letting go ------------------------------------------------------------------------------------
+    # -- letting go ----------------------------------------------------------------------
 
     def _let_go(self, *, all_ready: bool = False) -> None:
         """Release the critical nodes (or all with f >= 1) at the present load."""
         for g, v in zip(self.growths, self._values, strict=True):
             if all_ready:
-                ready = np.flatnonzero(v.f >= 1.0)
+                ready = np.flatnonzero(v.f >= g.criterion.window[0])
             elif v.f.max(initial=0.0) >= max(self._largest()) * (1.0 - 1e-6):
                 ready = g.ready(v)
             else:
                 continue
             if not len(ready):
                 continue
-            nodes = np.unique(v.tips.force_nodes[ready])
-            n_forces = len(self.model.loads)
-            before = self.model.state
-            self.released += self.model.release(g.p, nodes)
-            g.n_released += len(nodes)
-            after = self.model.state
-            self.work += work_between(before, after, n_forces)
+            self._release(g, np.unique(v.tips.force_nodes[ready]))
         self._look()
         self._record("release")
 
+    def _release(self, g: Growth, nodes: Ints) -> None:
+        """Let nodes of one interface go, at once or with time."""
+        g.let_go(nodes, self.time)
+        if g.debond.release.driver == "time":
+            ramp = TimedRelease.begin(self.model, g.p, nodes, g.debond.release, self.time)
+            self._ramps.append(ramp)
+            self.model.open(g.p, nodes)
+            return
+        before = self.model.state
+        self.released += self.model.release(g.p, nodes, self._force_at(self.time))
+        self.work += work_between(before, self.model.state, len(self.model.loads))
+
     def _look(self) -> None:
         """Find tips anew, factor again if the window does not hold them, evaluate."""
-        while True:
-            tips = [g.tips() for g in self.growths]
-            every = [
-                next((t for g, t in zip(self.growths, tips, strict=True) if g.p == p), None)
-                for p in range(len(self.model.pairs))
-            ]
-            if not self.model.require_tips(every):
-                break
+        tips = [g.tips() for g in self.growths]
+        if not all(g.held(t) for g, t in zip(self.growths, tips, strict=True)):
+            self.model.rebase()
+            self.model.solve(self._force_at(self.time))
         self._values = [
-            g.evaluate(t, self.model.state) for g, t in zip(self.growths, tips, strict=True)
+            g.evaluate(t, self.model.state, self.time)
+            for g, t in zip(self.growths, tips, strict=True)
         ]
 
     def _evaluate(self) -> list[TipValues]:
         return [
-            g.evaluate(v.tips, self.model.state)
+            g.evaluate(v.tips, self.model.state, self.time)
             for g, v in zip(self.growths, self._values, strict=True)
         ]
 
     def _largest(self) -> list[float]:
         return [float(v.f.max(initial=0.0)) for v in self._values] or [0.0]
 
+    def _any_ready(self) -> bool:
+        """Whether some f has reached the lower end of its window."""
+        return any(
+            v.f.max(initial=0.0) >= g.criterion.window[0]
+            for g, v in zip(self.growths, self._values, strict=True)
+        )
+
     def _upper(self, g: Growth) -> float:
         upper = 1.0 + g.criterion.tolerance
-        if g.criterion.unstable_tolerance is not None and g.n_released:
-            upper = max(upper, 1.0 + g.criterion.unstable_tolerance)
+        if g.unstable_tolerance is not None and g.n_released:
+            upper = max(upper, 1.0 + g.unstable_tolerance)
         return upper
 
-    def _may_run_on(self, unstable: float) -> bool:
-        """Several releases at one load: only within the unstable growth tolerance."""
-        del unstable
-        limits = [
-            g.criterion.unstable_tolerance
+    def _may_run_on(self) -> bool:
+        """Whether more nodes may go at this load: within the unstable growth tolerance."""
+        over = [
+            (float(v.f.max(initial=0.0)), g.unstable_tolerance)
             for g, v in zip(self.growths, self._values, strict=True)
             if v.f.max(initial=0.0) >= 1.0
         ]
-        if any(t is None for t in limits):
-            return False
-        worst = [
-            v.f.max(initial=0.0) <= 1.0 + (t or 0.0)
-            for t, v in zip(
-                [g.criterion.unstable_tolerance for g in self.growths], self._values, strict=True
-            )
-        ]
-        return all(worst)
+        return all(t is not None and f <= 1.0 + t for f, t in over)
 
-    # -- ends and rows ---------------------------------------------------------------------------------
+    # -- ends and rows -------------------------------------------------------------------
 
     def _ended(self) -> str:
         for end in self.step.ends:
@@ -385,8 +399,8 @@ class March:
             if len(v.tips):
                 i = v.largest
                 row[f"f[{g.title}]"] = float(v.f[i])
-                for mode, rate in zip(("GI", "GII", "GIII"), v.rates[i], strict=True):
-                    row[f"{mode}[{g.title}]"] = float(rate)
+                for name, quantity in v.report.items():
+                    row[f"{name}[{g.title}]"] = float(quantity[i])
                 row[f"node[{g.title}]"] = int(v.tips.node[i])
         row["strain_energy"] = energy
         row["external_work"] = self.work

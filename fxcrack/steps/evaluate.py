@@ -1,0 +1,198 @@
+"""What a criterion says at the tips of one interface.
+
+An evaluator measures quantities at the tips that are linear between two equilibria of the same
+states (bond forces, openings, tractions, time), and turns them into f and what the history
+reports. So the place where f reaches 1 on a linear piece is found without another solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.criteria import RateCriterion, closure_rates, energy_release_rates
+from fxcrack.interface.front import Tips
+from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.jump_system import Equilibrium
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class TipValues:
+    """What the criterion says at the tips of one interface.
+
+    Attributes:
+        tips: Front nodes.
+        f: Criterion, shape (n,).
+        report: Quantities behind it by name, each of shape (n,), e.g. GI, GII, GIII.
+    """
+
+    tips: Tips
+    f: Array
+    report: dict[str, Array]
+
+    @property
+    def largest(self) -> int:
+        """Position of the critical tip."""
+        return int(np.argmax(self.f))
+
+
+class Evaluator(Protocol):
+    """A criterion applied to a model.
+
+    Attributes:
+        degree: f grows with this power of a proportional load.
+        ahead: Distance ahead of a tip whose bond forces are needed, length.
+        behind: Distance behind a tip whose openings are needed, length.
+    """
+
+    degree: int
+    ahead: float
+    behind: float
+
+    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+        """Quantities linear between equilibria, shape (n_tips, m)."""
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F and report from measured quantities, shape (n_tips, m)."""
+
+    def needs(self, tips: Tips) -> Ints:
+        """Slave nodes beyond force and wake nodes whose jumps the window must hold."""
+
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which what is measured bends."""
+
+
+class RateEvaluator:
+    """Energy release rates by crack closure, for VCCT and the criteria built on it.
+
+    Args:
+        model: Condensed model.
+        p: Number of the pair.
+        criterion: Criterion with toughness and mode mix.
+    """
+
+    degree = 2
+    ahead = 0.0
+    behind = 0.0
+
+    def __init__(self, model: CondensedModel, p: int, criterion: RateCriterion) -> None:
+        self.model = model
+        self.p = p
+        self.criterion = criterion
+        surface = model.fronts[p].surface
+        criterion.check_slaves(surface.n_nodes)
+        self.toughness = criterion.toughness_at(
+            surface.x[:, : model.continuum.gdim],
+            np.arange(surface.n_nodes),
+            n_slave=surface.n_nodes,
+        )
+
+    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+        """Tip forces and the openings they are multiplied with, shape (n, 6 k)."""
+        force = self.model.bond_forces(self.p, tips, state)
+        if self.criterion.method == "closure":
+            opening = self.model.closure_jumps(self.p, tips, force)
+        else:
+            opening = self.model.openings(self.p, tips, state)
+        return np.concatenate([force.reshape(len(tips), -1), opening.reshape(len(tips), -1)], 1)
+
+    def rates(self, tips: Tips, measured: Array) -> Array:
+        """Energy release rates by mode, shape (n, 3), force/length."""
+        half = measured.shape[1] // 2
+        force, opening = (m.reshape(len(tips), -1, 3) for m in np.split(measured, [half], axis=1))
+        if self.criterion.method == "closure":
+            return closure_rates(force, opening, tips.area)
+        return energy_release_rates(
+            force,
+            opening,
+            tips.d_ahead,
+            tips.d_behind,
+            tips.width,
+            normalisation=self.criterion.normalisation,
+        )
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F and GI, GII, GIII."""
+        rates = self.rates(tips, measured)
+        f = self.criterion.ratio(rates, self.toughness[tips.node])
+        return f, dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+
+    def needs(self, tips: Tips) -> Ints:
+        """Nothing beyond the tips themselves."""
+        return np.zeros(0, dtype=np.int64)
+
+    def breaks(self) -> tuple[float, ...]:
+        """Rates do not depend on time as such."""
+        return ()
+
+
+def repeat_tips(tips: Tips, times: int) -> Tips:
+    """The same tips several times over, first all of them once, then again."""
+    if times == 1:
+        return tips
+
+    def tile(a: Any) -> Any:
+        return np.tile(a, (times,) + (1,) * (a.ndim - 1))
+
+    return Tips(**{name: tile(getattr(tips, name)) for name in Tips.__dataclass_fields__})
+
+
+def first_crossing(
+    evaluator: Evaluator,
+    tips: Tips,
+    ends: tuple[tuple[Equilibrium, float], tuple[Equilibrium, float]],
+    *,
+    upward: bool = True,
+) -> float | None:
+    """First fraction of a linear piece at which the largest f crosses 1.
+
+    Args:
+        evaluator: The criterion.
+        tips: Front nodes.
+        ends: Equilibrium and time at both ends.
+        upward: Look for f rising to 1, or falling to it.
+
+    Returns:
+        Fraction between 0 and 1, ``None`` if f stays on its side.
+    """
+    if not len(tips):
+        return None
+    a, b = (evaluator.measure(tips, state, time) for state, time in ends)
+    n = len(tips)
+
+    def root(x: Array) -> Array:
+        many = np.concatenate([(1.0 - y) * a + y * b for y in x])
+        f, _ = evaluator.value(repeat_tips(tips, len(x)), many)
+        largest = np.maximum(f.reshape(len(x), n).max(axis=1), 0.0)
+        return np.asarray(largest ** (1.0 / evaluator.degree) - 1.0)
+
+    grid = np.linspace(0.0, 1.0, 9)
+    values = root(grid)
+    passed = values >= 0.0 if upward else values <= 0.0
+    if not passed.any():
+        return None
+    k = int(np.argmax(passed))
+    if k == 0:
+        return 0.0
+    low, high, f_low, f_high = grid[k - 1], grid[k], values[k - 1], values[k]
+    for _ in range(60):
+        # linear for proportional loads: the secant hits at once (Illinois safeguard otherwise)
+        x = low - f_low * (high - low) / (f_high - f_low)
+        if not low < x < high:
+            break
+        value = float(root(np.array([x]))[0])
+        if abs(value) < 4e-15:
+            return float(x)
+        if (value >= 0.0) == upward:
+            high, f_high, f_low = x, value, 0.5 * f_low
+        else:
+            low, f_low, f_high = x, value, 0.5 * f_high
+        if high - low < 1e-15:
+            break
+    return float(high)
