@@ -41,8 +41,18 @@ _KEPT = ("OMPI_MCA_btl", "OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFI
 
 def peak_memory(comm: MPI.Intracomm) -> float:
     """Highest resident size of every rank's process so far, summed over ranks, MB; collective."""
+    return float(comm.allreduce(_peak()))
+
+
+def _peak() -> float:
+    """Highest resident size of this process, MB."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # not getrusage: a process started by a large one inherits that one's maximum there
+        lines = [line.split() for line in status.read_text().splitlines()]
+        return next(float(line[1]) for line in lines if line[0] == "VmHWM:") * 1024.0 / 1e6
     unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024.0
-    return float(comm.allreduce(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit))
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
 
 def slowest(comm: MPI.Intracomm, seconds: float) -> float:

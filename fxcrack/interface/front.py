@@ -129,8 +129,13 @@ class Front:
         return self.surface.order == 2
 
     def _check_middles(self, facets: Ints) -> None:
-        """In 2-D the unbonded part must cover whole element faces."""
-        if self.surface.dim == 1:
+        """The open part must cover whole element faces, so midside nodes follow their ends."""
+        if self.surface.dim == 2:
+            # midsides of edges from corners first, then centres from midsides
+            for first, middle, last in _LINES[self.surface.kind]:
+                ends = facets[:, [first, last]]
+                self.bonded[facets[:, middle]] = self.bonded[ends].all(axis=1)
+        else:
             self._is_middle[facets[:, 2]] = True
             ends = self.bonded[facets[:, :2]].sum(axis=1)
             wrong = self.bonded[facets[:, 2]] & (ends == 0) | ~self.bonded[facets[:, 2]] & (

@@ -101,11 +101,14 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
             if not np.all(np.isfinite(values)):
                 problem = f"Displacement('{support.title}'): {axis} is not a finite number"
             taken = which[dofs] >= 0
-            if np.any(taken & (value[dofs] != values)):
-                other = columns[which[dofs[taken & (value[dofs] != values)][0]]].title
+            other = np.array([c.support.amplitude != support.amplitude for c in columns] + [False])
+            differs = (value[dofs] != values) | (other[which[dofs]] & (values != 0.0))
+            if np.any(taken & differs):
+                first = int(np.argmax(taken & differs))
                 problem = (
-                    f"supports '{support.title}.{axis}' and '{other}' prescribe different values "
-                    f"at {x[nodes[np.argmax(taken)]]}; let only one of them hold that node"
+                    f"supports '{support.title}.{axis}' and '{columns[which[dofs[first]]].title}' "
+                    f"prescribe different values or amplitudes at {x[nodes[first]]}; let only one "
+                    "of them hold that node"
                 )
             free = ~taken
             which[dofs[free]], value[dofs[free]] = len(columns), values[free]

@@ -2,7 +2,7 @@
 
     min_xi | x - sum_k N_k(xi) x_k |,   xi inside the facet
 
-Matching nodes are recognised first and get the single weight 1.
+Nodes of the surface itself get the single weight 1.
 """
 
 from __future__ import annotations
@@ -38,33 +38,45 @@ class Projection:
     distance: Array
 
 
-def project(points: Array, surface: FacetSurface, *, n_candidates: int = 12) -> Projection:
+def project(points: Array, surface: FacetSurface) -> Projection:
     """Project points onto a surface.
 
     Args:
         points: Shape (n, 3).
         surface: Facets to project on.
-        n_candidates: Facets with the closest centres that are tried for each point.
 
     Returns:
-        The closest feet found; points beyond the border fall on the border.
+        The closest feet; points beyond the border fall on the border.
     """
-    corners = surface.x[surface.facets[:, : surface.n_corners]]
-    tree = cKDTree(corners.mean(axis=1))
-    n_candidates = min(n_candidates, len(surface.facets))
-    _, candidate = tree.query(points, k=n_candidates)
-    candidate = np.asarray(candidate).reshape(len(points), n_candidates)
     n, k = len(points), surface.facets.shape[1]
     best = np.full(n, np.inf)
     facet = np.zeros(n, dtype=np.int64)
     xi_best = np.zeros((n, surface.dim))
-    for column in candidate.T:
-        xi = _closest(points, surface.x[surface.facets[column]], surface)
+
+    def attempt(chosen: Ints, column: Ints) -> None:
+        nodes = surface.x[surface.facets[column]]
+        xi = _closest(points[chosen], nodes, surface)
         values, _ = shape_functions(surface.kind, surface.order, xi)
-        foot = np.einsum("nk,nkc->nc", values, surface.x[surface.facets[column]])
-        distance = np.linalg.norm(points - foot, axis=1)
-        better = distance < best * (1.0 - 1e-12)
-        best[better], facet[better], xi_best[better] = distance[better], column[better], xi[better]
+        foot = np.einsum("nk,nkc->nc", values, nodes)
+        distance = np.linalg.norm(points[chosen] - foot, axis=1)
+        better = distance < best[chosen] * (1.0 - 1e-12)
+        won = chosen[better]
+        best[won], facet[won], xi_best[won] = distance[better], column[better], xi[better]
+
+    for members, centre, radius in _by_size(surface):
+        tree, waiting, n_near = cKDTree(centre), np.arange(n), min(4, len(members))
+        while len(waiting):
+            far, near = tree.query(points[waiting], k=n_near)
+            far, near = far.reshape(len(waiting), -1), near.reshape(len(waiting), -1)
+            for away, column in zip(far.T, near.T, strict=True):
+                # a facet lies within its radius of its centre, and none is closer than touching
+                hopeful = (away - radius < best[waiting]) & (best[waiting] > 1e-12 * radius)
+                if hopeful.any():
+                    attempt(waiting[hopeful], members[column[hopeful]])
+            open_end = (far[:, -1] - radius < best[waiting]) & (best[waiting] > 1e-12 * radius)
+            if n_near == len(members):
+                break
+            waiting, n_near = waiting[open_end], min(2 * n_near, len(members))
     weights, _ = shape_functions(surface.kind, surface.order, xi_best)
     weights = np.where(np.abs(weights) < 1e-9, 0.0, weights)
     one = np.abs(weights).max(axis=1) > 1.0 - 1e-8
@@ -74,6 +86,20 @@ def project(points: Array, surface: FacetSurface, *, n_candidates: int = 12) -> 
     normal = np.einsum("nk,nkc->nc", weights.reshape(n, k), surface.normals[surface.facets[facet]])
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
     return Projection(facet, weights, foot, normal, np.linalg.norm(points - foot, axis=1))
+
+
+def _by_size(surface: FacetSurface) -> list[tuple[Ints, Array, float]]:
+    """Facets of similar size together: their numbers, centres and largest radius.
+
+    On a graded surface the closest centre may belong to a small facet beside the large one that
+    holds the point; among facets of one size few centres need to be looked at.
+    """
+    nodes = surface.x[surface.facets]
+    centre = nodes[:, : surface.n_corners].mean(axis=1)
+    radius = np.linalg.norm(nodes - centre[:, None], axis=2).max(axis=1)
+    size = np.floor(np.log2(radius / radius.max() * (1.0 + 1e-9))).astype(np.int64)
+    groups = [np.flatnonzero(size == s) for s in np.unique(size)]
+    return [(g, centre[g], float(radius[g].max())) for g in groups]
 
 
 def _closest(points: Array, nodes: Array, surface: FacetSurface) -> Array:

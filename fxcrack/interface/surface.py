@@ -129,7 +129,8 @@ class FacetSurface:
     @cached_property
     def facet_size(self) -> float:
         """Median distance of neighbouring corners, length."""
-        corners = self.x[self.facets[:, : self.n_corners]]
+        around = [0, 1, 3, 2] if self.kind == "quadrilateral" else list(range(self.n_corners))
+        corners = self.x[self.facets[:, around]]
         edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)
         return float(np.median(edges))
 

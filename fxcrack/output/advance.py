@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -18,7 +17,7 @@ from matplotlib.tri import Triangulation
 
 from fxcrack.errors import InputError, unknown_name
 from fxcrack.interface.pairing import Interface
-from fxcrack.output.figure import GREY, INK, LIGHT, colour_bar, dress, legend, new_figure, save
+from fxcrack.output.figure import GREY, INK, LIGHT, colour_bar, dress, new_figure, save
 
 if TYPE_CHECKING:
     from fxcrack.scene import Scene
@@ -27,6 +26,7 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 _INITIAL = "#c3c9d3"
+_SEAMLESS: dict[str, Any] = {"linewidths": 0.3, "edgecolors": "face"}
 
 # facets as four-sided or three-sided pieces between neighbouring nodes, basix order
 _PIECES = {
@@ -40,19 +40,28 @@ _PIECES = {
 class ReleaseMap:
     """An interface seen from above, and when its nodes were released.
 
+    The crack reaches up to its bonded front nodes. So a triangle between two nodes and the centre
+    of a facet is open when one of its corners is; the centre counts as open when two nodes of the
+    facet are. A facet cut by the front is then half open, as in the crack area of the history.
+
     Attributes:
-        points: Slave nodes in the plane of the picture, shape (n_nodes, 2), length.
+        points: Slave nodes, then centres of facets, in the plane of the picture, shape
+            (n_points, 2), length.
         axes: Names of the two directions.
-        pieces: Pieces of facets, shape (n_pieces, 3 or 4).
-        order: Order of release of each node from 1, 0 initially open, inf bonded, (n_nodes,).
-        time: Time of release likewise.
+        triangles: Corners of each triangle, shape (n_triangles, 3).
+        order: Order of release of each point from 1, 0 initially open, inf bonded, (n_points,).
+        times: Time of each release, after the 0 of the initial crack, shape (n_released + 1,).
     """
 
     points: Array
     axes: tuple[str, str]
-    pieces: Ints
+    triangles: Ints
     order: Array
-    time: Array
+    times: Array
+
+    def opened(self) -> Array:
+        """Order of release at which each triangle opened, inf if bonded, shape (n_triangles,)."""
+        return np.asarray(self.order[self.triangles].min(axis=1))
 
 
 def release_map(
@@ -83,40 +92,33 @@ def release_map(
     normal = np.abs((surface.normals * surface.areas[:, None]).sum(axis=0))
     across = [i for i in range(3) if i != int(np.argmax(normal))]
     across.sort(key=lambda i: -float(np.ptp(surface.x[:, i])))
-    order = np.where(pair.bonded, np.inf, 0.0)
-    time = order.copy()
     if released is None:
         released = [r for g in scene.growths if g.title == title for r in g.released]
-    for i, (node, when) in enumerate(released):
-        order[node], time[node] = i + 1, when
+    order = np.where(pair.bonded, np.inf, 0.0)
+    order[[node for node, _ in released]] = 1.0 + np.arange(len(released))
+    pieces = np.concatenate([surface.facets[:, p] for p in _PIECES[surface.kind, surface.order]])
+    centre = surface.x[pieces].mean(axis=1)
+    ends = np.stack([pieces, np.roll(pieces, -1, axis=1)], axis=2)
+    hub = np.broadcast_to(len(order) + np.arange(len(pieces))[:, None, None], (*pieces.shape, 1))
     return ReleaseMap(
-        points=surface.x[:, across],
+        points=np.concatenate([surface.x, centre])[:, across],
         axes=("xyz"[across[0]], "xyz"[across[1]]),
-        pieces=np.concatenate([surface.facets[:, p] for p in _PIECES[surface.kind, surface.order]]),
-        order=order,
-        time=time,
+        triangles=np.concatenate([ends, hub], axis=2).reshape(-1, 3),
+        order=np.concatenate([order, np.sort(order[pieces], axis=1)[:, 1]]),
+        times=np.array([0.0, *[time for _, time in released]]),
     )
 
 
-def front_line(data: ReleaseMap, stage: int) -> tuple[Triangulation, Array]:
-    """Triangles and an indicator whose contour at 0.5 is the front after some releases.
-
-    Args:
-        data: From :func:`release_map`.
-        stage: Number of releases done.
-
-    Returns:
-        Triangles around the centre of each piece, and 1 where open, 0 where bonded, per corner.
-    """
-    centre = data.points[data.pieces].mean(axis=1)
-    number = len(data.points) + np.arange(len(centre))
-    ends = np.stack([data.pieces, np.roll(data.pieces, -1, axis=1)], axis=2)
-    hub = np.broadcast_to(number[:, None, None], (*ends.shape[:2], 1))
-    triangles = np.concatenate([ends, hub], axis=2).reshape(-1, 3)
-    is_open = (data.order <= stage).astype(float)
-    x, y = np.concatenate([data.points, centre]).T
-    values = np.concatenate([is_open, is_open[data.pieces].mean(axis=1)])
-    return Triangulation(x, y, triangles), values
+def _around(data: ReleaseMap) -> tuple[Array, Array]:
+    """Corners of the part of the interface worth showing: what opened and as much around it."""
+    opened = data.opened()
+    of_interest = data.triangles[np.isfinite(opened) & (opened > 0.0)]
+    low, high = data.points.min(axis=0), data.points.max(axis=0)
+    if not len(of_interest):
+        return low, high
+    first, last = (f(data.points[of_interest.ravel()], axis=0) for f in (np.min, np.max))
+    margin = 0.6 * float((last - first).max())
+    return np.maximum(low, first - margin), np.minimum(high, last + margin)
 
 
 def front_advance(
@@ -151,45 +153,42 @@ def front_advance(
     data = release_map(scene, interface, released)
 
     def draw() -> Figure:
-        size = np.ptp(data.points, axis=0)
-        height = float(np.clip(7.0 * size[1] / size[0] + 1.5, 2.4, 7.0))
+        low, high = _around(data)
+        size = high - low
+        height = float(np.clip(6.3 * size[1] / size[0] + 1.5, 2.4, 7.5))
         figure, ax = new_figure(8.0, height)
-        value = data.order if colour == "order" else data.time
-        last = value[data.pieces].max(axis=1)
-        initial = data.order[data.pieces].max(axis=1) == 0.0
-        open_now = np.isfinite(last) & ~initial
-        outline = data.points[data.pieces]
-        edge: dict[str, Any] = {"linewidths": 0.3, "edgecolors": "white"}
-        ax.add_collection(PolyCollection(list(outline[initial]), facecolors=_INITIAL, **edge))
-        bonded = ~np.isfinite(last)
-        ax.add_collection(PolyCollection(list(outline[bonded]), facecolors=LIGHT, **edge))
-        if np.any(open_now):
-            norm = Normalize(value[np.isfinite(value)].min(), value[np.isfinite(value)].max())
-            paint = PolyCollection(
-                list(outline[open_now]), array=last[open_now], cmap="viridis", norm=norm,
-                linewidths=0.3, edgecolors="face",
-            )  # fmt: skip
+        opened, corners = data.opened(), data.points[data.triangles]
+        for part, plain in ((opened == 0.0, _INITIAL), (np.isinf(opened), LIGHT)):
+            ax.add_collection(PolyCollection(list(corners[part]), facecolors=plain, **_SEAMLESS))
+        grown = np.isfinite(opened) & (opened > 0.0)
+        if np.any(grown):
+            step = opened[grown]
+            value = step if colour == "order" else data.times[step.astype(int)]
+            paint = PolyCollection(list(corners[grown]), array=value, cmap="viridis", **_SEAMLESS)
             ax.add_collection(paint)
             words = {"order": "Order of release", "time": "Time of release"}
             colour_bar(figure, ax, paint, label or words[colour])
-        total = int(np.isfinite(data.order).sum() - (data.order == 0.0).sum())
+        total = len(data.times) - 1
+        grid = Triangulation(data.points[:, 0], data.points[:, 1], data.triangles)
         for stage in np.unique(np.linspace(0, total, n_lines).astype(int)):
-            grid, inside = front_line(data, int(stage))
-            width = 1.8 if stage in (0, total) else 0.8
-            ax.tricontour(grid, inside, levels=[0.5], colors=[INK], linewidths=[width])
+            # just behind the bonded nodes
+            ax.tricontour(
+                grid, (data.order <= stage).astype(float), levels=[1e-6], colors=[INK],
+                linewidths=[1.8 if stage in (0, total) else 0.8],
+            )  # fmt: skip
         dress(ax, xlabel=data.axes[0], ylabel=data.axes[1], title=title)
         ax.grid(False)
         ax.set_aspect("equal")
-        ax.autoscale_view()
-        ax.margins(0.01)
+        ax.set_xlim(low[0], high[0])
+        ax.set_ylim(low[1], high[1])
         handles = [
             Patch(facecolor=_INITIAL, label="initial crack"),
             Patch(facecolor=LIGHT, edgecolor=GREY, linewidth=0.5, label="bonded"),
             Line2D([], [], color=INK, linewidth=1.0, label="front"),
         ]
-        legend(
-            ax, handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3,
-            borderaxespad=0.2, handlelength=1.4,
+        figure.legend(
+            handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=10,
+            labelcolor=INK, handlelength=1.4,
         )  # fmt: skip
         return figure
 

@@ -275,7 +275,7 @@ def _project(faces: Array, inner: Array, axes: Array, colours: Array) -> tuple[A
     seen = normal @ axes[2] > 0.0
     order = np.flatnonzero(seen)[np.argsort(centre[seen] @ axes[2], kind="stable")]
     light = axes.T @ np.array([-0.35, 0.75, 0.56])
-    bright = 0.72 + 0.28 * np.clip(normal[order] @ light, 0.0, 1.0)
+    bright = 0.84 + 0.16 * np.clip(normal[order] @ light, 0.0, 1.0)
     shaded = colours[order].copy()
     shaded[:, :3] *= bright[:, None]
     return faces[order] @ axes[:2].T, shaded

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +18,7 @@ from fxcrack.errors import InputError, unknown_name
 from fxcrack.interface.pairing import Interface
 from fxcrack.output.advance import front_advance
 from fxcrack.output.deformed import deformed
-from fxcrack.output.figure import COLOURS, INK, dress, from_zero, legend, new_figure, save
+from fxcrack.output.figure import COLOURS, GREY, INK, dress, from_zero, legend, new_figure, save
 from fxcrack.output.history import History
 
 __all__ = ["deformed", "front_advance", "load_opening", "r_curve"]
@@ -178,13 +177,17 @@ class Resistance:
 
     Attributes:
         length: Crack length, shape (n,), length.
-        rates: G I, II, III at the critical front node, shape (n, 3), force/length.
+        rates: G I, II, III at the critical front node, shape (n, 3), force/length; NaN if the
+            criterion does not tell.
         f: Criterion there, shape (n,).
+        onset: Whether the load changed since the release before: growth that runs on at one load
+            is no equilibrium, its G may lie anywhere, shape (n,).
     """
 
     length: Array
     rates: Array
     f: Array
+    onset: npt.NDArray[np.bool_]
 
 
 def resistance(history: History, interface: Interface | str) -> Resistance:
@@ -199,10 +202,14 @@ def resistance(history: History, interface: Interface | str) -> Resistance:
         unknown_name("debonding interface in the history:", title, known)
     rows = growth_rows(history, interface)
     if not len(rows):
-        return Resistance(np.zeros(0), np.zeros((0, 3)), np.zeros(0))
-    rates = [history[f"{mode}[{title}]"][rows].astype(float) for mode in ("GI", "GII", "GIII")]
-    length, f = (history[f"{name}[{title}]"][rows].astype(float) for name in ("a", "f"))
-    return Resistance(length, np.stack(rates, axis=1), f)
+        return Resistance(np.zeros(0), np.zeros((0, 3)), np.zeros(0), np.zeros(0, dtype=bool))
+    names = [f"{name}[{title}]" for name in ("a", "f", "GI", "GII", "GIII")]
+    length, f, *rates = (
+        history[c][rows].astype(float) if c in history.columns else np.full(len(rows), np.nan)
+        for c in names
+    )
+    onset = np.diff(history["time"][rows], prepend=np.nan) != 0.0
+    return Resistance(length, np.stack(rates, axis=1), f, onset)
 
 
 def r_curve(
@@ -229,38 +236,50 @@ def r_curve(
         title: Heading.
 
     Raises:
-        InputError: The history knows no such interface, or the quantity is another one.
+        InputError: The history knows no such interface, or not the quantity.
         FxcrackError: The file could not be written.
     """
     if quantity not in ("G", "f"):
         raise InputError(f"r_curve: quantity = '{quantity}', choose 'G' or 'f'")
     data = resistance(history, interface)
+    if quantity == "G" and np.isnan(data.rates).any():
+        raise InputError(
+            f"the criterion of interface '{_title(interface)}' reports no energy release rates; "
+            "plot quantity='f'"
+        )
     meaning = {"G": "Energy release rate at growth", "f": "Criterion f at growth"}
 
     def draw() -> Figure:
         figure, ax = new_figure()
-        marker = "o" if len(data.length) <= 40 else ""
-        style: dict[str, Any] = {"marker": marker, "markersize": 4.0, "zorder": 3}
+        some, many = data.onset, not data.onset.all()
+
+        def curve(y: Array, label: str, colour: str, width: float) -> None:
+            if many:
+                ax.plot(data.length, y, color=colour, linewidth=0.7, alpha=0.35, zorder=2)
+            marker = "o" if some.sum() <= 40 else ""
+            ax.plot(
+                data.length[some], y[some], marker=marker, markersize=4.0, color=colour,
+                linewidth=width, label=label, zorder=3,
+            )  # fmt: skip
+
         if quantity == "f":
-            ax.plot(data.length, data.f, color=COLOURS[0], linewidth=2.0, label="f", **style)
+            curve(data.f, "f", COLOURS[0], 2.0)
             ax.axhline(1.0, color=INK, linewidth=1.2, linestyle="--", label="f = 1", zorder=4)
         else:
             total = data.rates.sum(axis=1)
-            modes = np.flatnonzero(
-                np.abs(data.rates).max(axis=0, initial=0.0) > 0.01 * np.abs(total).max(initial=0.0)
-            )
             names = ["$G_\\mathrm{I}$", "$G_\\mathrm{II}$", "$G_\\mathrm{III}$"]
-            name = "$G$" if len(modes) != 1 else f"$G$ = {names[modes[0]]}"
-            ax.plot(data.length, total, color=COLOURS[0], linewidth=2.0, label=name, **style)
-            for i in modes if len(modes) > 1 else ():
-                ax.plot(
-                    data.length, data.rates[:, i], color=COLOURS[1 + i], linewidth=1.4,
-                    label=names[i], **style,
-                )  # fmt: skip
+            largest = np.abs(data.rates).max(axis=0, initial=0.0)
+            modes = np.flatnonzero(largest > 0.01 * np.abs(total).max(initial=0.0))
+            alone = len(modes) == 1
+            curve(total, f"$G$ = {names[modes[0]]}" if alone else "$G$", COLOURS[0], 2.0)
+            for i in [] if alone else modes:
+                curve(data.rates[:, i], names[i], COLOURS[2 + i], 1.4)
             if toughness is not None:
                 x = data.length if len(data.length) else np.array([0.0, 1.0])
                 y = toughness(x) if callable(toughness) else np.full(len(x), float(toughness))
                 ax.plot(x, y, "--", color=COLOURS[1], linewidth=1.6, label="toughness", zorder=4)
+        if many:
+            ax.plot([], [], color=GREY, linewidth=0.7, label="growth running on at one load")
         dress(ax, xlabel=xlabel, ylabel=ylabel or meaning[quantity], title=title)
         ax.set_ylim(bottom=min(0.0, ax.dataLim.y0), top=1.12 * ax.dataLim.y1)
         legend(ax, loc="best")

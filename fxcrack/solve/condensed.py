@@ -22,6 +22,7 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
+from fxcrack.solve.softening import SoftBond
 from fxcrack.solve.window import CostModel, choose_roles
 
 Array = npt.NDArray[np.float64]
@@ -84,6 +85,7 @@ class CondensedModel:
         self.reach = [np.inf] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
+        self._soft: list[SoftBond] = []
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
         self._stiffness: PETSc.Mat | None = None
         self._borders: list[PETSc.Vec] = []
@@ -101,6 +103,8 @@ class CondensedModel:
             reach: Distance the crack may grow per interface, inf if unknown.
         """
         self.active, self.reach = active, reach
+        if hasattr(self, "system"):
+            self._soft = self.system.soft.bonds
         self._rebase()
         self.rebases = 0
 
@@ -123,6 +127,7 @@ class CondensedModel:
             reach,
             self._cost,
             around=self.around,
+            keep=[b.where[:2] for b in self._soft],
             cap_mb=self.options.window_mb,
             gdim=self.continuum.gdim,
         )
@@ -150,7 +155,7 @@ class CondensedModel:
         )
         self._face_loads = -self._condensation.borders_on_window[:, : len(self.loads)]
         start = time.perf_counter()
-        self._restore_states(roles)
+        self._restore_states()
         self.timings.add("march", start)
         log.info(
             "factorisation %d: %d coordinates in the window",
@@ -158,21 +163,31 @@ class CondensedModel:
             coordinates.n_window,
         )
 
-    def _restore_states(self, roles: list[npt.NDArray[np.int8]]) -> None:
-        """Free what is open in the new window and mark what may touch."""
+    def _restore_states(self) -> None:
+        """Free what is open in the new window, soften what softens, mark what may touch."""
+        bonds = self._soft
+        for bond in bonds:
+            p, node, local = bond.where
+            bond.components = self.index[p][node, local]
+        soft = np.concatenate([b.components for b in bonds]) if bonds else np.zeros(0, np.int64)
         for pair, front, index in zip(self.pairs, self.fronts, self.index, strict=True):
             is_open = ~front.bonded
             self.system.gap[index[:, 0][index[:, 0] >= 0]] = pair.gap[index[:, 0] >= 0]
             free = index[is_open]
-            free = free[free >= 0]
+            free = free[(free >= 0) & ~np.isin(free, soft)]
             if len(free):
                 self.system.release(free)
             if pair.interface.contact:
                 self._let_touch(pair, front, index)
+        if bonds:
+            self.system.contact[soft] = False
+            self.system.soften(bonds)
 
     def _let_touch(self, pair: Pair, front: Front, index: Ints) -> None:
         normals = index[~front.bonded & pair.paired, 0]
-        self.system.contact[normals[normals >= 0]] = True
+        normals = normals[normals >= 0]
+        self.system.touches[normals] = True
+        self.system.contact[normals[~np.isin(normals, self.system.soft.components)]] = True
 
     def holds(self, p: int, nodes: Ints) -> bool:
         """Whether the window holds all jumps of some slave nodes that may differ from zero."""
@@ -189,6 +204,7 @@ class CondensedModel:
         Given forces are lost: the caller sets them again (see :meth:`solve`).
         """
         self.rebases += 1
+        self._soft = self.system.soft.bonds
         loads = self.state.loads
         self._rebase()
         self.state = Equilibrium(
@@ -296,6 +312,47 @@ class CondensedModel:
         return out
 
     # -- letting go ----------------------------------------------------------------------
+
+    def soften(self, p: int, nodes: Ints, energy: Array) -> None:
+        """Let the bond forces of nodes fall linearly with their opening.
+
+        A normal force that presses stays: the node is in contact from then on.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, bonded so far.
+            energy: Energy each of them is to dissipate, shape (n,).
+
+        Raises:
+            NotPositiveDefinite: A body would come free; nothing is changed.
+        """
+        system, state = self.system, self.state
+        bonds, force = [], state.force.copy()
+        for node, spend in zip(nodes, energy, strict=True):
+            local = np.flatnonzero(self.index[p][node] >= 0)
+            components = self.index[p][node, local]
+            traction = -system.forces(state, components)
+            if local[0] == 0 and traction[0] < 0.0:
+                system.contact[components[0]] = system.closed[components[0]] = True
+                local, components, traction = local[1:], components[1:], traction[1:]
+            strength = float(np.linalg.norm(traction))
+            if not strength > 0.0:
+                system.release(components)
+                continue
+            force[components] = -traction
+            bonds.append(
+                SoftBond(
+                    components, traction / strength, strength, 2.0 * spend / strength,
+                    (p, int(node), local),
+                )
+            )  # fmt: skip
+        self.fronts[p].release(nodes)
+        if bonds:
+            system.soften(bonds)
+            if self.pairs[p].interface.contact:
+                normals = self.index[p][nodes, 0]
+                system.touches[normals[normals >= 0]] = True
+        self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 
     def components(self, p: int, nodes: Ints) -> Ints:
         """Window components of slave nodes."""

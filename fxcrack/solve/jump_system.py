@@ -12,7 +12,7 @@ they press (p_n >= 0) and frees them while they gape (delta_n >= -gap).
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from scipy.optimize import nnls
 
 from fxcrack.errors import ConvergenceError
 from fxcrack.solve.cholesky import GrowingCholesky
+from fxcrack.solve.softening import SoftBond, SoftSet
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -60,6 +61,7 @@ class JumpSystem:
         free: Components whose force is known, shape (n_window,).
         closed: Normal components held by contact, shape (n_window,).
         contact: Normal components that may be in contact now, shape (n_window,).
+        touches: Normal components that may be in contact once their bond is gone, likewise.
         gap: Initial gaps, shape (n_window,), length.
         contact_steps: Number of active-set steps done.
     """
@@ -74,9 +76,11 @@ class JumpSystem:
         self.free = np.zeros(n_window, dtype=bool)
         self.closed = np.zeros(n_window, dtype=bool)
         self.contact = np.zeros(n_window, dtype=bool)
+        self.touches = np.zeros(n_window, dtype=bool)
         self.gap = np.zeros(n_window)
         self.contact_steps = 0
         self.cholesky = GrowingCholesky(schur)
+        self.soft = SoftSet(schur)
         self._forward = np.zeros((0, n_loads))
         self._unit: Array | None = None
 
@@ -96,8 +100,41 @@ class JumpSystem:
         right = self.schur[np.ix_(new, self.load_columns)] - left @ self._forward
         tile = self.cholesky._rows[n : n + k, n : n + k]
         self._forward = np.vstack([self._forward, np.linalg.solve(tile, right)])
+        if self.soft.bonds:
+            self.soft.extend(new, left, tile)
         self.free[new] = True
         self._unit = None
+
+    def soften(self, bonds: list[SoftBond]) -> None:
+        """Let the forces of held bonds fall with their opening from now on."""
+        self.soft.bonds += bonds
+        self.soft.refresh(self.cholesky)
+
+    def _finish(self, gone: list[SoftBond]) -> None:
+        """Free bonds that have opened all the way."""
+        if not gone:
+            return
+        self.soft.bonds = [b for b in self.soft.bonds if all(b is not g for g in gone)]
+        self.soft.refresh(self.cholesky)
+        free = np.concatenate([b.components for b in gone])
+        self.release(free)
+        self.contact[free] |= self.touches[free]
+
+    def snapshot(self) -> tuple[Bools, Bools, list[SoftBond]]:
+        """What :meth:`restore` needs to return to the present states."""
+        return self.free.copy(), self.closed.copy(), [replace(b) for b in self.soft.bonds]
+
+    def restore(self, saved: tuple[Bools, Bools, list[SoftBond]]) -> None:
+        """Return to earlier states; only contact and softening may have changed since."""
+        free, closed, bonds = saved
+        self._set_closed(closed)
+        self.soft.bonds = bonds
+        extra = np.flatnonzero(self.free & ~free)
+        self.contact[extra] = False
+        if len(extra):
+            self.hold(extra)
+        elif bonds:
+            self.soft.refresh(self.cholesky)
 
     def hold(self, components: Ints) -> None:
         """Hold components again (contact)."""
@@ -106,6 +143,8 @@ class JumpSystem:
         self._forward = self.cholesky.forward(
             self.schur[np.ix_(self.cholesky.free, self.load_columns)]
         )
+        if self.soft.bonds:
+            self.soft.refresh(self.cholesky)
         self._unit = None
 
     # -- equilibrium with given states ---------------------------------------------------
@@ -128,11 +167,42 @@ class JumpSystem:
         if np.any(right):
             part = part + self.cholesky.solve(right)
         jump[free] = part
+        if self.soft.bonds:
+            force = self._add_soft(jump, loads, force)
         columns = self.load_columns
-        active = np.concatenate([free, held])
+        active = np.flatnonzero(jump)
         conjugate = self.schur[np.ix_(columns, active)] @ jump[active]
         conjugate += self.schur[np.ix_(columns, columns)] @ loads
         return Equilibrium(loads, force, jump, self.sign * conjugate)
+
+    def _soft_right(self, jump: Array, loads: Array) -> Array:
+        """-g*: minus the forces on the softening components if they did not open."""
+        mine = self.soft.components
+        active = np.flatnonzero(jump)
+        right = -self.schur[np.ix_(mine, active)] @ jump[active]
+        return np.asarray(right - self.schur[np.ix_(mine, self.load_columns)] @ loads)
+
+    def _add_soft(self, jump: Array, loads: Array, force: Array) -> Array:
+        """Add the softening jumps and what they open elsewhere; returns all given forces."""
+        mine = self.soft.components
+        soft = self.soft.solve(self._soft_right(jump, loads))
+        jump[self.cholesky.free] -= self.cholesky.backward(self.soft.coupling @ soft)
+        jump[mine] = soft
+        force = force.copy()
+        force[mine] = self.soft.forces(soft)
+        return force
+
+    def _pass_unstable(self, state: Equilibrium) -> Equilibrium:
+        """Run downhill from an unstable state to the next stable one, at constant load."""
+        mine = self.soft.components
+        still = state.jump.copy()
+        still[self.cholesky.free] += self.cholesky.backward(self.soft.coupling @ state.jump[mine])
+        still[mine] = 0.0
+        right = self._soft_right(still, state.loads)
+        self._finish(self.soft.snap(right, state.jump[mine]))
+        given = state.force.copy()
+        given[mine] = 0.0
+        return self.linear(state.loads, given)
 
     def forces(self, state: Equilibrium, rows: Ints) -> Array:
         """Interface forces on the slave side at some components, shape (len(rows),)."""
@@ -251,20 +321,25 @@ class JumpSystem:
         here, last = 0.0, start
         stuck = done = 0
         while True:
+            if self.soft.bonds and not self.soft.stable():
+                last = self._pass_unstable(last)
+                yield here, last
+                continue
             end = self.linear(loads, force)
-            if not self.contact.any():
+            if not self.contact.any() and not self.soft.bonds:
                 yield 1.0, end
                 return
             wrong, gap, pressure = self._violations(end)
-            if not wrong.any():
+            fraction = self._first_change(last, wrong, gap, pressure)
+            at_soft, leaving = self.soft.first_event(last.jump, end.jump)
+            step = min(float(fraction.min(initial=np.inf)), at_soft)
+            if not np.isfinite(step):
                 yield 1.0, end
                 return
-            fraction = self._first_change(last, wrong, gap, pressure)
-            step = float(fraction.min())
             changing = np.flatnonzero(fraction <= step + 1e-12)
             stuck = stuck + 1 if step < 1e-12 else 0
             done += 1
-            if stuck > 3 or done > 4 * self.n_window + 20:
+            if stuck > 3 + 2 * len(self.soft.bonds) or done > 4 * self.n_window + 20:
                 # degenerate: several nodes change at once; the active set finds the end
                 yield 1.0, self.equilibrium(loads, force)
                 return
@@ -272,8 +347,10 @@ class JumpSystem:
             point = blend(last, end, step)
             if step > 0.0:
                 yield at, point
-            self.contact_steps += 1
+            self.contact_steps += len(changing) > 0
             self._switch(changing)
+            if at_soft <= step + 1e-12:
+                self._finish([b for b in leaving if self.soft.switch(b, point.jump)])
             here, last = at, point
 
     def _first_change(self, last: Equilibrium, wrong: Bools, gap: Array, pressure: Array) -> Array:

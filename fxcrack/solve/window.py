@@ -8,6 +8,7 @@ components, c the cost of an entry of S, refitted from the last factorisation.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -78,7 +79,8 @@ def choose_roles(
     reach: list[float],
     cost: CostModel,
     *,
-    around: list[tuple[float, float]],
+    around: list[tuple[float, float]] | None = None,
+    keep: Sequence[tuple[int, int]] = (),
     cap_mb: float,
     gdim: int,
 ) -> list[npt.NDArray[np.int8]]:
@@ -91,6 +93,7 @@ def choose_roles(
         reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
         cost: Cost model.
         around: Distances ahead of and behind the tips that the criterion looks at, per pair.
+        keep: (pair, slave node) of bonds that soften and must stay in the window.
         cap_mb: Memory S may take, MB.
         gdim: Dimension.
 
@@ -100,7 +103,7 @@ def choose_roles(
     roles, waiting = [], []
     n_fixed = 0
     for p, (pair, front, on, far) in enumerate(zip(pairs, fronts, active, reach, strict=True)):
-        ahead, behind = around[p]
+        ahead, behind = (0.0, 0.0) if around is None else around[p]
         role = np.full((pair.surface.n_nodes, gdim), INNER, dtype=np.int8)
         bonded = front.bonded & pair.paired
         role[bonded, 0] = HELD
@@ -126,6 +129,9 @@ def choose_roles(
             rest = np.flatnonzero(bonded & ~near & (distance <= far))
             rest = rest[np.lexsort((rest, distance[rest]))]
             waiting += [(float(distance[i]), p, int(i)) for i in rest]
+        for which, node in keep:
+            if which == p:
+                role[node] = WINDOW
         roles.append(role)
         n_fixed += int((role == WINDOW).sum())
     waiting.sort()

@@ -13,7 +13,14 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria import RateCriterion, closure_rates, energy_release_rates
+from fxcrack.criteria import (
+    EnhancedVCCT,
+    Ramp,
+    RateCriterion,
+    Release,
+    closure_rates,
+    energy_release_rates,
+)
 from fxcrack.interface.front import Tips
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
@@ -122,6 +129,27 @@ class RateEvaluator:
         rates = self.rates(tips, measured)
         f = self.criterion.ratio(rates, self.toughness[tips.node])
         return f, dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+
+    def energy_to_spend(self, nodes: Ints, values: TipValues, release: Release) -> Array:
+        """Energy that softening nodes dissipate until they are free, shape (n,)."""
+        surface = self.model.fronts[self.p].surface
+        tips = values.tips
+        rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
+        toughness = self.toughness[tips.node]
+        if isinstance(self.criterion, EnhancedVCCT):
+            toughness = self.criterion.propagation_toughness_at(
+                surface.x[tips.node, : self.model.continuum.gdim],
+                tips.node,
+                n_slave=surface.n_nodes,
+            )
+        critical = self.criterion.critical(rates, toughness)
+        if isinstance(release, Ramp) and not isinstance(self.criterion, EnhancedVCCT):
+            # 1/2 F0 w_c with the opening of the wake: what crack closure calls G A
+            critical = rates.sum(axis=1)
+        out = np.zeros(len(nodes))
+        for node_set, rate in zip(tips.force_nodes, critical, strict=True):
+            out[np.isin(nodes, node_set)] = rate
+        return out * surface.areas[nodes]
 
     def needs(self, tips: Tips) -> Ints:
         """Nothing beyond the tips themselves."""

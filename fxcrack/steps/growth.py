@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria import RateCriterion, Release, Step
+from fxcrack.criteria import EnhancedVCCT, RateCriterion, Release, Step
 from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Tips
@@ -112,6 +112,21 @@ class Growth:
         if not len(values.f) or values.f.max() < level * (1.0 - 1e-9):
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(values.f >= values.f.max() * (1.0 - _TIE))
+
+    @property
+    def opening_driven(self) -> bool:
+        """Whether bond forces fall with their opening."""
+        return self.debond.release.driver == "opening" or isinstance(self.criterion, EnhancedVCCT)
+
+    def energy_to_spend(self, nodes: Ints, values: TipValues) -> Array:
+        """Energy that nodes which soften have to dissipate, shape (n,).
+
+        Progressive release: the critical rate at the present mode mix times the node's area;
+        enhanced VCCT: that of propagation; ramp: half the force times the wake opening at onset.
+        """
+        evaluator = self.evaluator
+        assert isinstance(evaluator, RateEvaluator)
+        return evaluator.energy_to_spend(nodes, values, self.debond.release)
 
     def let_go(self, nodes: Ints, time: float) -> None:
         """Count nodes as released."""

@@ -9,12 +9,14 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.errors import InputError
+from fxcrack.interface.front import Tips
 from fxcrack.output.history import History, Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
@@ -139,7 +141,7 @@ class March:
             if reason:
                 return reason
             target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
-            states = self.model.system.closed.copy()
+            states = self.model.system.snapshot()
             pieces = list(self._pieces(target))
             self._follow(pieces, target)
             values = self._evaluate()
@@ -170,16 +172,13 @@ class March:
         )
 
     def _follow(self, pieces: list[tuple[float, Equilibrium]], target: float) -> None:
-        n_forces = len(self.model.loads)
         for _, point in pieces:
-            self.work += work_between(self.model.state, point, n_forces)
-            self.released += bond_work(self.model.state, point)
-            self.model.state = point
+            self._advance(self.model.state, point, target)
         self.time = target
 
-    def _undo(self, closed: npt.NDArray[np.bool_]) -> float:
+    def _undo(self, states: tuple[Any, Any, Any]) -> float:
         self.time, self.model.state, self.work, self.released = self._undo_state
-        self.model.system._set_closed(closed)
+        self.model.system.restore(states)
         return self.time
 
     def _breaks_ahead(self) -> list[float]:
@@ -233,38 +232,61 @@ class March:
         Returns:
             Whether it did.
         """
-        system, n_forces = self.model.system, len(self.model.loads)
+        system = self.model.system
         begin = self.time
         tips = [v.tips for v in self._values]
         path = system.pieces(self.model.state, self.loads_at(target), self._force_at(target))
+        before = -1.0
         for fraction, point in path:
             here = self.model.state
             times = (self.time, begin + fraction * (target - begin))
-            found = [
-                g.crossing(t, here, point, times, upward=upward)
-                for g, t in zip(self.growths, tips, strict=True)
-            ]
-            hits = [x for x in found if x is not None]
-            if upward:
-                hit = min(hits, default=None)
-            else:
-                # all interfaces must be below 1; a tip-less one does not count
-                waiting = [x for x, t in zip(found, tips, strict=True) if len(t)]
-                hit = None if None in waiting else max(hits, default=None)
-            if hit is not None:
-                point = blend(here, point, hit)
-                self.time = times[0] + hit * (times[1] - times[0])
-            else:
-                self.time = times[1]
-            self.work += work_between(here, point, n_forces)
-            self.released += bond_work(here, point)
-            self.model.state = point
-            if hit is not None:
+            if fraction == before or times[0] == times[1]:
+                # an unstable state was passed: no equilibrium lies in between
+                self._advance(here, point, times[1])
                 self._values = self._evaluate()
-                return True
+                if upward and max(self._largest()) >= 1.0:
+                    return True
+                continue
+            before = fraction
+            hit = self._hit(tips, here, point, times, upward=upward)
+            if hit is None:
+                self._advance(here, point, times[1])
+                continue
+            self._advance(here, blend(here, point, hit), times[0] + hit * (times[1] - times[0]))
+            self._values = self._evaluate()
+            return True
         self.time = target
         self._values = self._evaluate()
         return False
+
+    def _hit(
+        self,
+        tips: list[Tips],
+        here: Equilibrium,
+        point: Equilibrium,
+        times: tuple[float, float],
+        *,
+        upward: bool,
+    ) -> float | None:
+        """Fraction of a linear piece at which the largest f of all interfaces crosses 1."""
+        found = [
+            g.crossing(t, here, point, times, upward=upward)
+            for g, t in zip(self.growths, tips, strict=True)
+        ]
+        if upward:
+            return min([x for x in found if x is not None], default=None)
+        # all interfaces must be below 1; one without tips does not count
+        waiting = [x for x, t in zip(found, tips, strict=True) if len(t)]
+        if not waiting or None in waiting:
+            return None
+        return max(x for x in waiting if x is not None)
+
+    def _advance(self, here: Equilibrium, point: Equilibrium, time: float) -> None:
+        """Move along a linear piece and account for its energy."""
+        self.work += work_between(here, point, len(self.model.loads))
+        self.released += bond_work(here, point)
+        self.model.state = point
+        self.time = time
 
     # -- letting go ----------------------------------------------------------------------
 
@@ -279,17 +301,20 @@ class March:
                 continue
             if not len(ready):
                 continue
-            self._release(g, np.unique(v.tips.force_nodes[ready]))
+            self._release(g, np.unique(v.tips.force_nodes[ready]), v)
         self._look()
         self._record("release")
 
-    def _release(self, g: Growth, nodes: Ints) -> None:
+    def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:
         """Let nodes of one interface go, at once or with time."""
         g.let_go(nodes, self.time)
         if g.debond.release.driver == "time":
             ramp = TimedRelease.begin(self.model, g.p, nodes, g.debond.release, self.time)
             self._ramps.append(ramp)
             self.model.open(g.p, nodes)
+            return
+        if g.opening_driven:
+            self.model.soften(g.p, nodes, g.energy_to_spend(nodes, values))
             return
         before = self.model.state
         self.released += self.model.release(g.p, nodes, self._force_at(self.time))

@@ -1,0 +1,190 @@
+"""Fields on an interface: jumps, bond tractions, state and front, the same on every rank.
+
+Jumps and bond forces are taken from the displacement field, so they are known on the whole
+interface and not only in the window:
+
+    jump_s = u_s - sum_m W_sm u_m,        r = K u - sum_i lambda_i f_i,        t_s = -f_s / area_s
+
+with f_s the bond or contact force on slave node s, its row of T^t r: the residual there, plus that
+of the slaves it carries as a master.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from fxcrack import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
+import numpy as np
+import numpy.typing as npt
+from dolfinx import fem
+
+from fxcrack.continuum import Continuum
+from fxcrack.steps.evaluate import TipValues
+
+if TYPE_CHECKING:
+    from fxcrack.scene import Scene
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class InterfaceFields:
+    """What is known at the slave nodes of an interface, the same on every rank.
+
+    Attributes:
+        displacement: Displacement of the slave nodes, shape (n_nodes, 3), length.
+        opening: Jump from master to slave, shape (n_nodes, 3), length.
+        traction: Bond or contact force per tributary area, positive along the normal in tension,
+            shape (n_nodes, 3), force/length^2.
+        normal: Unit vectors from master to slave, shape (n_nodes, 3).
+        state: 1 bonded, 0 open, -1 no master beneath, shape (n_nodes,).
+        front: 1 on front nodes, shape (n_nodes,).
+        release_time: Time at which a node was released, 0 if it was open from the start, NaN while
+            it is bonded, shape (n_nodes,).
+        at_front: What the criterion says at the front nodes, 0 elsewhere, each of shape (n_nodes,):
+            f, and what is behind it, as GI, GII, GIII and their sum G (force/length).
+    """
+
+    displacement: Array
+    opening: Array
+    traction: Array
+    normal: Array
+    state: npt.NDArray[np.int32]
+    front: npt.NDArray[np.int32]
+    release_time: Array
+    at_front: dict[str, Array]
+
+
+def residual(scene: Scene, u: fem.Function) -> Array:
+    """Forces of interfaces and supports on the bodies, K u - f; collective.
+
+    Returns:
+        Shape (n_local,), the owned dofs of this rank, force.
+    """
+    continuum, factors = scene.continuum, scene.model.state.loads
+    stiffness = continuum.stiffness()
+    out = stiffness.createVecLeft()
+    stiffness.mult(u.x.petsc_vec, out)
+    stiffness.destroy()
+    for load, factor in zip(scene.loads, factors[len(factors) - len(scene.loads) :], strict=True):
+        pattern = continuum.load_vector(load)
+        out.axpy(-factor, pattern)
+        pattern.destroy()
+    values = out.array.copy()
+    out.destroy()
+    return np.asarray(values)
+
+
+def _shared(continuum: Continuum, blocks: Ints, owned: Array) -> Array:
+    """Values of global displacement nodes on every rank, shape (n_blocks, gdim); collective.
+
+    Args:
+        continuum: Displacement space.
+        blocks: Global nodes, sorted, the same on every rank.
+        owned: Values of the owned dofs, shape (n_local,).
+    """
+    gdim = continuum.gdim
+    low, count = continuum.offset // gdim, continuum.n_local // gdim
+    mine = np.flatnonzero((blocks >= low) & (blocks < low + count))
+    out = np.zeros((len(blocks), gdim))
+    for where, what in continuum.comm.allgather(
+        (mine, owned.reshape(-1, gdim)[blocks[mine] - low])
+    ):
+        out[where] = what
+    return out
+
+
+def in_space(values: Array) -> Array:
+    """Vectors with three components, shape (n, gdim) to (n, 3)."""
+    return np.pad(values, ((0, 0), (0, 3 - values.shape[1])))
+
+
+def interface_fields(
+    scene: Scene, u: fem.Function, time: float | None = None
+) -> list[InterfaceFields]:
+    """Fields on every interface of the scene, in the order of ``scene.pairs``; collective.
+
+    Args:
+        scene: The scene.
+        u: Its displacement, from :func:`displacement_function`.
+        time: Time of the present state; that of the scene by default.
+    """
+    continuum, pairs = scene.continuum, scene.pairs
+    used = [np.concatenate([p.surface.dofs, p.masters.ravel()]) for p in pairs]
+    blocks = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
+    motion = _shared(continuum, blocks, u.x.array[: continuum.n_local])
+    direct = _shared(continuum, blocks, residual(scene, u))
+    slaves = [np.searchsorted(blocks, p.surface.dofs) for p in pairs]
+    masters = [np.searchsorted(blocks, p.masters) for p in pairs]
+    acting = [
+        p.paired & (front.bonded | (index >= 0).any(axis=1))
+        for p, front, index in zip(pairs, scene.model.fronts, scene.model.index, strict=True)
+    ]
+    total = direct
+    for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
+        carried = np.zeros_like(direct)
+        for pair, s, m, on in zip(pairs, slaves, masters, acting, strict=True):
+            np.add.at(carried, m[on], pair.weights[on, :, None] * total[s[on], None, :])
+        total = direct + carried
+    return [
+        _fields_of(
+            scene,
+            p,
+            motion[slaves[p]],
+            motion[masters[p]],
+            np.where(acting[p][:, None], total[slaves[p]], 0.0),
+            scene.time if time is None else time,
+        )
+        for p in range(len(pairs))
+    ]
+
+
+def _fields_of(
+    scene: Scene, p: int, slave: Array, masters: Array, force: Array, time: float
+) -> InterfaceFields:
+    """Fields on pair p from the displacements and forces at its nodes."""
+    pair, model = scene.pairs[p], scene.model
+    surface = pair.surface
+    under = np.einsum("nk,nkc->nc", pair.weights, masters)
+    opening = np.where(pair.paired[:, None], slave - under, 0.0)
+    # a component that a support holds carries the support's reaction, not a bond force
+    local = np.einsum("nck,nc->nk", model.frames[p], force)
+    local[model.held_by_supports[p]] = 0.0
+    bond = np.einsum("nck,nk->nc", model.frames[p], local)
+    area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
+    state = np.where(pair.paired, model.fronts[p].bonded.astype(np.int32), -1)
+    front = np.zeros(surface.n_nodes, dtype=np.int32)
+    when = np.where(model.fronts[p].bonded, np.nan, 0.0)
+    at_front: dict[str, Array] = {}
+    for growth in scene.growths:
+        if growth.p == p:
+            tips = growth.tips()
+            front[tips.node] = 1
+            for node, moment in growth.released:
+                when[node] = moment
+            if model.active[p]:
+                at_front = _at_front(growth.evaluate(tips, model.state, time), surface.n_nodes)
+    return InterfaceFields(
+        displacement=in_space(slave),
+        opening=in_space(opening),
+        traction=-in_space(bond) / area[:, None],
+        normal=in_space(pair.frames[:, :, 0]),
+        state=state.astype(np.int32),
+        front=front,
+        release_time=when,
+        at_front=at_front,
+    )
+
+
+def _at_front(values: TipValues, n_nodes: int) -> dict[str, Array]:
+    """Values at the tips as arrays over all slave nodes."""
+    report = {"f": values.f, **values.report}
+    modes = [values.report[mode] for mode in ("GI", "GII", "GIII") if mode in values.report]
+    if modes:
+        report["G"] = np.sum(modes, axis=0)
+    out = {name: np.zeros(n_nodes) for name in report}
+    for name, value in report.items():
+        out[name][values.tips.node] = value
+    return out
