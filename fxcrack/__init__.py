@@ -2,7 +2,8 @@
 
 from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
 from fxcrack.abort import install as _install_abort
-from fxcrack.criteria import BK, VCCT, Power, Reeder
+from fxcrack.criteria import BK, VCCT, EnhancedVCCT, Power, Progressive, Reeder, Step, Tabulated
+from fxcrack.criteria import Ramp as OpeningRamp
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.interface.pairing import Interface
 from fxcrack.loads import (
@@ -29,6 +30,11 @@ __version__ = "0.1.0"
 _install_abort()
 
 __all__ = [
+    "OpeningRamp",
+    "Tabulated",
+    "Step",
+    "Progressive",
+    "EnhancedVCCT",
     "BK",
     "VCCT",
     "Amplitude",

@@ -86,6 +86,7 @@ class Scene:
         self.time = 0.0
         self._work = 0.0
         self._released = 0.0
+        self._snapped = 0.0
         self.history = History(mesh.comm)
         self._started = False
 
@@ -139,6 +140,9 @@ class Scene:
             if np.any(at_start):
                 self._jump_to(at_start)
             self._started = True
+        else:
+            # another window: the same equilibrium in its components
+            self.model.solve(np.zeros(self.model.system.n_window))
         with Progress(self.mesh.comm, enabled=progress) as show:
             march = March(
                 self.model,
@@ -150,10 +154,12 @@ class Scene:
                 time=self.time,
                 work=self._work,
                 released=self._released,
+                snapped=self._snapped,
                 observer=show,
             )
             self.history.reason = march.run()
         self.time, self._work, self._released = march.time, march.work, march.released
+        self._snapped = march.snapped
         self.history.details = {
             "dofs": self.continuum.n_global,
             "window": self.model.system.n_window,

@@ -86,6 +86,7 @@ class CondensedModel:
         self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
         self._soft: list[SoftBond] = []
+        self._taken = 0.0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
         self._stiffness: PETSc.Mat | None = None
         self._borders: list[PETSc.Vec] = []
@@ -104,7 +105,7 @@ class CondensedModel:
         """
         self.active, self.reach = active, reach
         if hasattr(self, "system"):
-            self._soft = self.system.soft.bonds
+            self._soft, self._taken = self.system.soft.bonds, self.system.soft.finished
         self._rebase()
         self.rebases = 0
 
@@ -179,6 +180,7 @@ class CondensedModel:
                 self.system.release(free)
             if pair.interface.contact:
                 self._let_touch(pair, front, index)
+        self.system.soft.finished = self._taken
         if bonds:
             self.system.contact[soft] = False
             self.system.soften(bonds)
@@ -204,7 +206,7 @@ class CondensedModel:
         Given forces are lost: the caller sets them again (see :meth:`solve`).
         """
         self.rebases += 1
-        self._soft = self.system.soft.bonds
+        self._soft, self._taken = self.system.soft.bonds, self.system.soft.finished
         loads = self.state.loads
         self._rebase()
         self.state = Equilibrium(

@@ -116,17 +116,20 @@ class JumpSystem:
             return
         self.soft.bonds = [b for b in self.soft.bonds if all(b is not g for g in gone)]
         self.soft.refresh(self.cholesky)
+        self.soft.finished += sum(0.5 * b.strength * b.final for b in gone)
         free = np.concatenate([b.components for b in gone])
         self.release(free)
         self.contact[free] |= self.touches[free]
 
-    def snapshot(self) -> tuple[Bools, Bools, list[SoftBond]]:
+    def snapshot(self) -> tuple[Bools, Bools, list[SoftBond], float]:
         """What :meth:`restore` needs to return to the present states."""
-        return self.free.copy(), self.closed.copy(), [replace(b) for b in self.soft.bonds]
+        return self.free.copy(), self.closed.copy(), [replace(b) for b in self.soft.bonds], (
+            self.soft.finished
+        )
 
-    def restore(self, saved: tuple[Bools, Bools, list[SoftBond]]) -> None:
+    def restore(self, saved: tuple[Bools, Bools, list[SoftBond], float]) -> None:
         """Return to earlier states; only contact and softening may have changed since."""
-        free, closed, bonds = saved
+        free, closed, bonds, self.soft.finished = saved
         self._set_closed(closed)
         self.soft.bonds = bonds
         extra = np.flatnonzero(self.free & ~free)

@@ -61,6 +61,13 @@ class SoftBond:
             return self.strength * (1.0 - opening / self.final)
         return self.secant * opening
 
+    def taken(self, opening: float) -> float:
+        """Energy the bond has taken up to an opening, the part it would give back included."""
+        if self.largest is None:
+            return self.strength * opening * (1.0 - 0.5 * opening / self.final)
+        dissipated = 0.5 * self.strength * self.largest
+        return dissipated + 0.5 * self.secant * opening**2
+
     @property
     def secant(self) -> float:
         """Stiffness of the secant branch, force/length."""
@@ -76,6 +83,7 @@ class SoftSet:
 
     Attributes:
         bonds: The bonds.
+        finished: Energy dissipated by bonds that have opened all the way.
         snaps: Number of unstable states passed.
         snap_steps: Iterations spent on them.
     """
@@ -83,10 +91,15 @@ class SoftSet:
     def __init__(self, schur: Array) -> None:
         self._schur = schur
         self.bonds: list[SoftBond] = []
+        self.finished = 0.0
         self.snaps = 0
         self.snap_steps = 0
         self._forward = np.zeros((0, 0))
         self._star: Array | None = None
+
+    def taken(self, jump: Array) -> float:
+        """Energy all softening bonds have taken so far, finished ones included."""
+        return self.finished + sum(b.taken(b.opening(jump)) for b in self.bonds)
 
     @property
     def components(self) -> Ints:

@@ -1,4 +1,4 @@
-"""Bonds that let go with time: their force is a known fraction of that at debonding."""
+"""Bonds that let go with time or over increments: a known fraction of the force remains."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria import AmplitudeRelease
+from fxcrack.criteria import AmplitudeRelease, Ramp
 from fxcrack.criteria import Release as ReleaseLaw
+from fxcrack.errors import InputError
 from fxcrack.solve.condensed import CondensedModel
 
 Array = npt.NDArray[np.float64]
@@ -17,20 +18,20 @@ Ints = npt.NDArray[np.int64]
 
 @dataclass(frozen=True)
 class TimedRelease:
-    """Nodes whose bond force falls along an amplitude of the time since debonding.
+    """Nodes whose bond force falls with the time, or the increments, since debonding.
 
     Attributes:
         p: Number of the pair.
         nodes: Slave nodes, shape (n,).
         force: Force on the slave side at debonding in jump components, shape (n, gdim).
-        law: The amplitude.
-        start: Time of debonding.
+        law: The amplitude, or the number of increments.
+        start: Time of debonding, or number of the increment.
     """
 
     p: int
     nodes: Ints
     force: Array
-    law: AmplitudeRelease
+    law: AmplitudeRelease | Ramp
     start: float
 
     @classmethod
@@ -38,17 +39,25 @@ class TimedRelease:
         cls, model: CondensedModel, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> TimedRelease:
         """Note the bond forces of nodes that are about to let go."""
-        assert isinstance(law, AmplitudeRelease)
+        if not isinstance(law, AmplitudeRelease | Ramp):
+            raise InputError(f"{type(law).__name__} is no release with time or increments")
         index = model.index[p][nodes]
         inside = (index >= 0) & ~model.system.free[np.maximum(index, 0)]
         force = np.zeros(index.shape)
         force[inside] = model.system.forces(model.state, index[inside])
         return cls(p, nodes, force, law, time)
 
-    def fraction(self, time: float) -> float:
-        """Remaining fraction of the force at a time."""
-        return float(self.law.remaining(time - self.start))
+    @property
+    def by_time(self) -> bool:
+        """Whether time drives it, and not increments."""
+        return self.law.driver == "time"
+
+    def fraction(self, now: float) -> float:
+        """Remaining fraction of the force at a time or an increment."""
+        return float(self.law.remaining(now - self.start))
 
     def breaks(self) -> tuple[float, ...]:
         """Times at which the amplitude bends."""
+        if not isinstance(self.law, AmplitudeRelease):
+            return ()
         return tuple(self.start + t for t in self.law.times)

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack import log
+from fxcrack.criteria import Ramp, Step
 from fxcrack.errors import InputError
 from fxcrack.interface.front import Tips
 from fxcrack.output.history import History, Row
@@ -61,6 +62,7 @@ class March:
         time: float = 0.0,
         work: float = 0.0,
         released: float = 0.0,
+        snapped: float = 0.0,
         observer: Observer | None = None,
     ) -> None:
         self.model = model
@@ -77,11 +79,22 @@ class March:
         self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=_LARGE)
         self._values: list[TipValues] = []
         self._ramps: list[TimedRelease] = []
+        self._increment = 0
+        # all energy that left through bonds but the softening ones
+        self._by_force = released - model.system.soft.taken(model.state.jump) - snapped
 
     # -- the three ways to step ----------------------------------------------------------
 
     def run(self) -> str:
         """March until an end condition holds; returns why the step ended."""
+        for g in self.growths:
+            law = g.debond.release
+            if isinstance(law, Ramp) and law.increments and self.step.stepping != "increment":
+                raise InputError(
+                    f"interface '{g.title}' lets go over {law.increments} increments, which "
+                    f"stepping='{self.step.stepping}' does not have; use stepping='increment', "
+                    "or a ramp with the opening (no number of increments)"
+                )
         start = clock.perf_counter()
         before = {k: v for k, v in self.model.timings.seconds.items() if k.startswith("factor")}
         self._look()
@@ -142,6 +155,7 @@ class March:
                 return reason
             target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
             states = self.model.system.snapshot()
+            self._increment += 1
             pieces = list(self._pieces(target))
             self._follow(pieces, target)
             values = self._evaluate()
@@ -150,6 +164,7 @@ class March:
                 for g, v in zip(self.growths, values, strict=True)
             ]
             if max(excess, default=-1.0) > 1e-12:
+                self._increment -= 1
                 used = target - self._undo(states)
                 control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
@@ -193,7 +208,8 @@ class March:
         for ramp in self._ramps:
             components = self.model.index[ramp.p][ramp.nodes]
             inside = components >= 0
-            force[components[inside]] = ramp.fraction(time) * ramp.force[inside]
+            now = time if ramp.by_time else float(self._increment)
+            force[components[inside]] = ramp.fraction(now) * ramp.force[inside]
         return force
 
     def _load_to_event(self) -> bool:
@@ -244,6 +260,7 @@ class March:
                 # an unstable state was passed: no equilibrium lies in between
                 self._advance(here, point, times[1])
                 self._values = self._evaluate()
+                self._record("snap")
                 if upward and max(self._largest()) >= 1.0:
                     return True
                 continue
@@ -285,6 +302,10 @@ class March:
         """Move along a linear piece and account for its energy."""
         self.work += work_between(here, point, len(self.model.loads))
         self.released += bond_work(here, point)
+        for ramp in self._ramps:
+            index = self.model.components(ramp.p, ramp.nodes)
+            force = here.force[index] + point.force[index]
+            self._by_force -= 0.5 * float(force @ (point.jump[index] - here.jump[index]))
         self.model.state = point
         self.time = time
 
@@ -308,8 +329,10 @@ class March:
     def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:
         """Let nodes of one interface go, at once or with time."""
         g.let_go(nodes, self.time)
-        if g.debond.release.driver == "time":
-            ramp = TimedRelease.begin(self.model, g.p, nodes, g.debond.release, self.time)
+        law = g.debond.release
+        if not g.opening_driven and not isinstance(law, Step):
+            now = self.time if law.driver == "time" else float(self._increment)
+            ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)
             self._ramps.append(ramp)
             self.model.open(g.p, nodes)
             return
@@ -317,7 +340,9 @@ class March:
             self.model.soften(g.p, nodes, g.energy_to_spend(nodes, values))
             return
         before = self.model.state
-        self.released += self.model.release(g.p, nodes, self._force_at(self.time))
+        energy = self.model.release(g.p, nodes, self._force_at(self.time))
+        self.released += energy
+        self._by_force += energy
         self.work += work_between(before, self.model.state, len(self.model.loads))
 
     def _look(self) -> None:
@@ -400,6 +425,11 @@ class March:
         log.warn("%s", reason)
         return reason
 
+    @property
+    def snapped(self) -> float:
+        """Energy lost where softening bonds ran through unstable states."""
+        return self.released - self._by_force - self.model.system.soft.taken(self.model.state.jump)
+
     def _column_names(self) -> list[tuple[str, str, bool]]:
         moving = [(c.title, c.moves) for c in self.model.supports.columns]
         names = [(f"u[{t}]", f"R[{t}]", m) for t, m in moving]
@@ -430,6 +460,8 @@ class March:
         row["strain_energy"] = energy
         row["external_work"] = self.work
         row["released_energy"] = self.released
+        if model.system.soft.bonds or model.system.soft.finished:
+            row["snap_energy"] = self.snapped
         row["balance"] = self.work - energy - self.released
         self.history.append(row)
         if self._observer is not None:

@@ -1,0 +1,232 @@
+"""Low-cycle fatigue: what the user may say about a step of cycles, and what cycles leave behind.
+
+A cycle runs between two load states, or once through amplitudes that end where they began. Bodies
+are linear elastic and contact is frictionless, so an equilibrium depends on the loads alone and
+not on the way to them: every cycle is a stabilised one, and solving its corners replaces the
+Fourier series of a direct cyclic analysis exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.criteria import Fatigue, Step
+from fxcrack.errors import InputError
+from fxcrack.steps.growth import Debond
+from fxcrack.steps.static import Static
+from fxcrack.steps.until import Time, Until
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cycles:
+    """A step of load cycles, in which interfaces with a :class:`Fatigue` criterion grow.
+
+    Say what the cycle is in one of three ways:
+
+    ==================== =======================================================================
+    maximum, minimum     times of the amplitudes (with the default ramp: load factors) of the two
+                         extremes; the loads go straight from one to the other and back
+    maximum, ratio       the same, with all loads of the maximum times R at the minimum
+    period               first and last time of one turn through the amplitudes, for loads that are
+                         not in step with each other; they must return to where they began
+    ==================== =======================================================================
+
+    G_max and G_min are the extremes of the total rate on this way, as they are for each tip. On a
+    piece without a change of contact they follow from its two ends; a piece with changes is
+    halved until they change by less than ``change``.
+
+    Bonds let go at the maximum of the cycle (with ``period`` at its corner of largest f), where
+    the step ends, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
+
+    Args:
+        maximum: Time of the largest loads.
+        minimum: Time of the smallest loads.
+        ratio: Loads at the minimum over loads at the maximum, R < 1.
+        period: First and last time of a turn through the amplitudes.
+        n_max: Number of cycles after which the step ends.
+        until: End condition, or several of which the first met ends the step.
+        change: Largest change of G_max and G_min, over G_max, by halving a piece of the cycle.
+    """
+
+    maximum: float | None = None
+    minimum: float | None = None
+    ratio: float | None = None
+    period: tuple[float, float] | None = None
+    n_max: float = float("inf")
+    until: Until | tuple[Until, ...] = ()
+    change: float = 5e-3
+
+    def __post_init__(self) -> None:
+        """Check what needs no loads."""
+        given = [self.minimum is not None, self.ratio is not None]
+        if self.period is not None:
+            complete = self.maximum is None and not any(given)
+        else:
+            complete = self.maximum is not None and sum(given) == 1
+        if not complete:
+            raise InputError(
+                "Cycles: give maximum and minimum, or maximum and ratio, or period, and nothing "
+                "beside"
+            )
+        numbers = [x for x in (self.maximum, self.minimum, self.ratio) if x is not None]
+        if not np.all(np.isfinite([*numbers, *(self.period or ())])):
+            raise InputError("Cycles: times and ratio must be finite numbers")
+        if self.ratio is not None and self.ratio >= 1.0:
+            raise InputError(f"Cycles: ratio = {self.ratio} must be below 1")
+        if self.period is not None and self.period[0] >= self.period[1]:
+            raise InputError(f"Cycles: period = {self.period} must end after it begins")
+        if not self.n_max > 0.0:
+            raise InputError(f"Cycles: n_max = {self.n_max} must be positive")
+        if not 0.0 < self.change < 1.0:
+            raise InputError(f"Cycles: change = {self.change} must lie between 0 and 1")
+        if any(isinstance(end, Time) for end in self.ends):
+            raise InputError(
+                "Cycles: time stands still while cycles are counted; end with n_max, CrackLength "
+                "or Releases instead of Time"
+            )
+
+    @property
+    def ends(self) -> tuple[Until, ...]:
+        """End conditions as a tuple."""
+        return self.until if isinstance(self.until, tuple) else (self.until,)
+
+    def corners(
+        self,
+        loads_at: Callable[[float], Array],
+        breaks: Sequence[float],
+        names: Sequence[str],
+    ) -> list[tuple[float, Array]]:
+        """Time and loads at the corners of the cycle, the maximum first unless a period is given.
+
+        Args:
+            loads_at: Amplitudes and load factors at a time, shape (n_loads,).
+            breaks: Times at which an amplitude changes its slope.
+            names: Names of the loads, n_loads of them.
+
+        Raises:
+            InputError: An amplitude does not return to its beginning, or no load changes.
+        """
+        if self.period is not None:
+            first, last = self.period
+            times = [first, *sorted(t for t in set(breaks) if first < t < last)]
+            found = [(t, loads_at(t)) for t in times]
+            self._check_return(found[0][1], loads_at(last), names)
+        else:
+            assert self.maximum is not None
+            top = loads_at(self.maximum)
+            if self.ratio is not None:
+                found = [(self.maximum, top), (self.maximum, self.ratio * top)]
+            else:
+                assert self.minimum is not None
+                found = [(self.maximum, top), (self.minimum, loads_at(self.minimum))]
+        if not any(np.any(loads != found[0][1]) for _, loads in found[1:]):
+            raise InputError(
+                f"Cycles: no load changes in the cycle (they are {found[0][1]} all the time); "
+                "look at the amplitudes and at the times given"
+            )
+        return found
+
+    def _check_return(self, begin: Array, end: Array, names: Sequence[str]) -> None:
+        far = np.abs(end - begin) > 1e-9 * max(np.abs(begin).max(), np.abs(end).max())
+        if np.any(far):
+            i = int(np.argmax(far))
+            raise InputError(
+                f"Cycles: the amplitude of {names[i]} is not cyclic: {begin[i]:.6g} at the "
+                f"beginning and {end[i]:.6g} at the end of the period {self.period}; amplitudes "
+                "must end at the value they begin with"
+            )
+
+
+def check_criteria(step: Static | Cycles, debonds: Sequence[Debond]) -> None:
+    """Fatigue grows in cycles, everything else outside them.
+
+    Args:
+        step: The step.
+        debonds: Those that are to grow in it.
+
+    Raises:
+        InputError: A criterion and the step do not go together.
+    """
+    for debond in debonds:
+        who = f"interface '{debond.interface.title}'"
+        if not isinstance(step, Cycles):
+            if isinstance(debond.criterion, Fatigue):
+                raise InputError(
+                    f"{who} has a Fatigue criterion, which needs cycles: run fx.Cycles(...), or "
+                    "leave it out of this step, grow=[other debonds]; it stays tied then"
+                )
+            continue
+        if not isinstance(debond.criterion, Fatigue):
+            raise InputError(
+                f"{who} has the criterion {type(debond.criterion).__name__}, which does not grow "
+                "in cycles: use Fatigue, or leave it out of this step, grow=[other debonds]; it "
+                "stays tied then"
+            )
+        if not isinstance(debond.release, Step):
+            raise InputError(
+                f"{who}: in cycles bonds let go at once; use release=Step() (the default) "
+                f"instead of {type(debond.release).__name__}"
+            )
+    if isinstance(step, Cycles) and not debonds:
+        raise InputError("Cycles: no interface may grow in this step; give a Debond with Fatigue")
+
+
+@dataclass(frozen=True)
+class TipCycle:
+    """One stabilised cycle at the tips of an interface.
+
+    Attributes:
+        dG: Range of the total rate, shape (n,), force/length.
+        G_max: Its largest value, likewise.
+        G_c: Critical total rate at the mode mix of G_max, likewise.
+        dadN: Growth per cycle, shape (n,), length: by the Paris law, 0 below the threshold, the
+            whole element beyond the upper limit.
+    """
+
+    dG: Array
+    G_max: Array
+    G_c: Array
+    dadN: Array
+
+
+_COLUMNS = ("N", "interface", "node", "a", "G_max", "dG", "G_c", "dadN", "released")
+
+
+@dataclass
+class FatigueState:
+    """What cycles leave behind for later ones.
+
+    Attributes:
+        N: Cycles so far, over all steps.
+        waiting: Per pair, slave nodes at which onset is still to come, shape (n_nodes,).
+        credit: Per pair, growth within the element of each slave node, shape (n_nodes,), length.
+        table: One entry per tip and stabilised cycle in each column: N and the crack length at
+            its beginning (of the tip in 2-D, the mean of the front in 3-D), what the cycle says
+            there, and whether the tip was let go at its end.
+    """
+
+    N: float = 0.0
+    waiting: dict[int, Bools] = field(default_factory=dict)
+    credit: dict[int, Array] = field(default_factory=dict)
+    table: dict[str, list[float | int | str | bool]] = field(
+        default_factory=lambda: {name: [] for name in _COLUMNS}
+    )
+
+    def meet(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
+        """See a front; the nodes of the first one seen on a pair wait for onset."""
+        if p not in self.waiting:
+            self.waiting[p] = np.zeros(n_nodes, dtype=np.bool_)
+            self.waiting[p][front] = True
+            self.credit[p] = np.zeros(n_nodes)
+
+    def note(self, **columns: Sequence[float | int | str | bool]) -> None:
+        """Add one entry per tip to every column of the table."""
+        for name in _COLUMNS:
+            self.table[name] += columns[name]
