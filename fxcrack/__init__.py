@@ -2,7 +2,20 @@
 
 from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
 from fxcrack.abort import install as _install_abort
-from fxcrack.criteria import BK, VCCT, EnhancedVCCT, Power, Progressive, Reeder, Step, Tabulated
+from fxcrack.criteria import (
+    BK,
+    VCCT,
+    AmplitudeRelease,
+    CrackLengthVsTime,
+    CrackOpening,
+    CriticalStress,
+    EnhancedVCCT,
+    Power,
+    Progressive,
+    Reeder,
+    Step,
+    Tabulated,
+)
 from fxcrack.criteria import Ramp as OpeningRamp
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.interface.pairing import Interface
@@ -30,20 +43,20 @@ __version__ = "0.1.0"
 _install_abort()
 
 __all__ = [
-    "OpeningRamp",
-    "Tabulated",
-    "Step",
-    "Progressive",
-    "EnhancedVCCT",
     "BK",
     "VCCT",
     "Amplitude",
+    "AmplitudeRelease",
     "Axisymmetric",
     "BodyForce",
     "CondensedOptions",
     "CrackLength",
+    "CrackLengthVsTime",
+    "CrackOpening",
+    "CriticalStress",
     "Debond",
     "Displacement",
+    "EnhancedVCCT",
     "FxcrackError",
     "History",
     "InputError",
@@ -51,12 +64,14 @@ __all__ = [
     "Isotropic",
     "Mesh",
     "Monitor",
+    "OpeningRamp",
     "Orthotropic",
     "PlaneStrain",
     "PlaneStress",
     "PointForce",
     "Power",
     "Pressure",
+    "Progressive",
     "Ramp",
     "Reeder",
     "Releases",
@@ -64,6 +79,8 @@ __all__ = [
     "Solid",
     "Split",
     "Static",
+    "Step",
+    "Tabulated",
     "Time",
     "Traction",
     "compat",

@@ -42,7 +42,7 @@ MESHES: dict[str, Any] = {
 }
 
 
-def cracked(kind: str = "2d", until: float = 11.0) -> fx.Scene:
+def cracked(kind: str = "2d", until: float = 11.0, **release: Any) -> fx.Scene:
     """A small double cantilever beam whose crack has grown from 8."""
     mesh, model = MESHES[kind]()
     z = 0.0 if mesh.gdim == 3 else None
@@ -55,7 +55,7 @@ def cracked(kind: str = "2d", until: float = 11.0) -> fx.Scene:
             fx.Displacement("pin_top", x=0.0, y=1.0, z=z),
             fx.Displacement("pin_bottom", x=0.0, y=-1.0, z=z),
         ],
-        debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2))],
+        debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2), **release)],
     )
     scene.run(fx.Static(until=fx.CrackLength(bond, until)))
     return scene
@@ -149,6 +149,21 @@ def test_state_front_and_rates_at_the_nodes() -> None:
     assert np.isnan(found.release_time[order][11:]).all()
     normal = np.einsum("nc,nc->n", found.normal, found.opening)
     assert normal[order][0] == pytest.approx(2.0 * row["u[pin_top.y]"], rel=1e-2)
+    scene.close()
+
+
+@pytest.mark.mpi
+def test_bonds_that_let_go_still_pull() -> None:
+    scene = cracked(release=fx.Progressive())
+    (found,) = interface_fields(scene, displacement_function(scene))
+    letting_go = found.state == 0.5
+    assert letting_go.any()
+    nodes = {bond.where[1] for bond in scene.model.system.soft.bonds}
+    np.testing.assert_array_equal(np.flatnonzero(letting_go), sorted(nodes))
+    assert (np.einsum("nc,nc->n", found.traction, found.normal)[letting_go] > 0.0).all()
+    assert not found.front[letting_go].any()
+    total = (found.traction * scene.pairs[0].surface.areas[:, None]).sum(axis=0)
+    assert total[1] == pytest.approx(scene.history.rows[-1]["R[pin_top.y]"], rel=1e-8)
     scene.close()
 
 

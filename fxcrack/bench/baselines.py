@@ -22,7 +22,8 @@ from petsc4py import PETSc
 
 from fxcrack.bench.measure import check_mumps, mumps_cholesky
 from fxcrack.bench.problem import Problem
-from fxcrack.criteria import energy_release_rates
+from fxcrack.criteria import RateCriterion, energy_release_rates
+from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Front, Tips
 from fxcrack.interface.jumps import JumpCoordinates, build_coordinates
@@ -262,7 +263,10 @@ class Follower:
         self._extent = CrackExtent(self.front)
         self._index = matrices.coordinates.index[0]
         self._frames = matrices.coordinates.frames[0]
-        self._criterion = scene.debonds[0].criterion
+        criterion = scene.debonds[0].criterion
+        if not isinstance(criterion, RateCriterion):
+            raise InputError(f"the baseline grows by VCCT, not by {type(criterion).__name__}")
+        self._criterion = criterion
         n = pair.surface.n_nodes
         x = pair.surface.x[:, : matrices.gdim]
         self._toughness = self._criterion.toughness_at(x, np.arange(n), n_slave=n)

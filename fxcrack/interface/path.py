@@ -1,4 +1,4 @@
-"""Walking along a slave surface from a crack tip, ahead over its bonded or behind over its open part.
+"""Walking along a slave surface from a crack tip, over the bonded part ahead or the open one behind.
 
 On a line (2-D) the way is the line itself, whatever its shape. On a surface (3-D) it is the mesh
 line most nearly along the growth direction; each step counts with its component in that direction,

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial import cKDTree
 
-from fxcrack.interface.surface import FacetSurface, shape_functions
+from fxcrack.interface.surface import FacetSurface, facet_element, shape_functions
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -79,7 +79,8 @@ def project(points: Array, surface: FacetSurface) -> Projection:
             waiting, n_near = waiting[open_end], min(2 * n_near, len(members))
     weights, _ = shape_functions(surface.kind, surface.order, xi_best)
     weights = np.where(np.abs(weights) < 1e-9, 0.0, weights)
-    one = np.abs(weights).max(axis=1) > 1.0 - 1e-8
+    at_node = facet_element(surface.kind, surface.order).points
+    one = (np.abs(xi_best[:, None] - at_node).max(axis=2) < 1e-8).any(axis=1)
     weights[one] = np.round(weights[one])
     weights /= weights.sum(axis=1, keepdims=True)
     foot = np.einsum("nk,nkc->nc", weights, surface.x[surface.facets[facet]])

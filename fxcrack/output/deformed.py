@@ -224,7 +224,10 @@ def deformed(
             border = np.zeros((0, 2, 2))
         every = np.concatenate([points.reshape(-1, 2), border.reshape(-1, 2)])
         size = np.ptp(every, axis=0)
-        figure, ax = new_figure(9.0, float(np.clip(7.2 * size[1] / size[0] + 1.1, 2.2, 8.0)))
+        low_and_wide = size[1] < 0.25 * size[0]
+        height = (8.3 if low_and_wide else 7.4) * size[1] / size[0]
+        height += (1.7 if low_and_wide else 1.0) - (0.0 if flat else 0.25)
+        figure, ax = new_figure(9.0, float(np.clip(height, 2.2, 8.0)))
         width = float(np.clip(60.0 / np.sqrt(len(points)), 0.0, 0.4))
         edges = "face" if width < 0.15 else (0.1, 0.12, 0.16, 0.35)
         faces = PolyCollection(list(points), facecolors=colours, linewidths=width, edgecolors=edges)
@@ -248,7 +251,7 @@ def deformed(
         if not flat:
             _triad(ax, axes)
         words = "von Mises stress" if component == "von_mises" else f"Stress {component}"
-        colour_bar(figure, ax, mapping, label or words, extend=extend)
+        colour_bar(figure, ax, mapping, label or words, below=low_and_wide, extend=extend)
         return figure
 
     save(scene.mesh.comm, path, draw)

@@ -38,7 +38,7 @@ def dress(ax: Axes, *, xlabel: str, ylabel: str, title: str | None = None) -> No
     ax.tick_params(labelsize=10, width=0.8, length=3.5, color=GREY, labelcolor=INK)
     ax.grid(color=LIGHT, linewidth=0.8)
     ax.set_axisbelow(True)
-    ax.locator_params(nbins=7)
+    ax.locator_params(nbins=8)
     ax.set_xlabel(xlabel, fontsize=11, color=INK, labelpad=6)
     ax.set_ylabel(ylabel, fontsize=11, color=INK, labelpad=6)
     if title:
@@ -51,10 +51,18 @@ def legend(ax: Axes, **where: Any) -> None:
         ax.legend(frameon=False, fontsize=10, labelcolor=INK, **where)
 
 
-def colour_bar(figure: Figure, ax: Axes, mappable: Any, label: str, **options: Any) -> None:
-    """A slim colour bar to the right of the axes, as high as they are."""
-    width = 0.15 / (figure.get_figwidth() - 1.5)
-    bar = figure.colorbar(mappable, cax=ax.inset_axes((1.0 + width, 0.0, width, 1.0)), **options)
+def colour_bar(
+    figure: Figure, ax: Axes, mappable: Any, label: str, *, below: bool = False, **options: Any
+) -> None:
+    """A slim colour bar on the right, as high as the axes, or below them."""
+    if below:
+        bar = figure.colorbar(
+            mappable, ax=ax, location="bottom", shrink=0.5, aspect=36, pad=0.03, **options
+        )
+    else:
+        share = 0.15 / (figure.get_figwidth() - 1.5)
+        cax = ax.inset_axes((1.0 + share, 0.0, share, 1.0))
+        bar = figure.colorbar(mappable, cax=cax, **options)
     bar.outline.set(linewidth=0.6, edgecolor=GREY)
     bar.ax.tick_params(labelsize=9, width=0.6, length=3, color=GREY, labelcolor=INK)
     bar.set_label(label, fontsize=10, color=INK)

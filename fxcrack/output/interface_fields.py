@@ -39,7 +39,8 @@ class InterfaceFields:
         traction: Bond or contact force per tributary area, positive along the normal in tension,
             shape (n_nodes, 3), force/length^2.
         normal: Unit vectors from master to slave, shape (n_nodes, 3).
-        state: 1 bonded, 0 open, -1 no master beneath, shape (n_nodes,).
+        state: 1 bonded, 0.5 letting go (some bond force is left), 0 open, -1 no master beneath,
+            shape (n_nodes,).
         front: 1 on front nodes, shape (n_nodes,).
         release_time: Time at which a node was released, 0 if it was open from the start, NaN while
             it is bonded, shape (n_nodes,).
@@ -51,7 +52,7 @@ class InterfaceFields:
     opening: Array
     traction: Array
     normal: Array
-    state: npt.NDArray[np.int32]
+    state: Array
     front: npt.NDArray[np.int32]
     release_time: Array
     at_front: dict[str, Array]
@@ -154,9 +155,13 @@ def _fields_of(
     local[model.held_by_supports[p]] = 0.0
     bond = np.einsum("nck,nk->nc", model.frames[p], local)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
-    state = np.where(pair.paired, model.fronts[p].bonded.astype(np.int32), -1)
+    bonded, index = model.fronts[p].bonded, model.index[p]
+    given = np.append(model.state.force, 0.0)  # components outside the window have index -1
+    letting_go = ~bonded & (given[index] != 0.0).any(axis=1)
+    state = np.where(bonded, 1.0, np.where(letting_go, 0.5, 0.0))
+    state[~pair.paired] = -1.0
     front = np.zeros(surface.n_nodes, dtype=np.int32)
-    when = np.where(model.fronts[p].bonded, np.nan, 0.0)
+    when = np.where(bonded, np.nan, 0.0)
     at_front: dict[str, Array] = {}
     for growth in scene.growths:
         if growth.p == p:
@@ -171,7 +176,7 @@ def _fields_of(
         opening=in_space(opening),
         traction=-in_space(bond) / area[:, None],
         normal=in_space(pair.frames[:, :, 0]),
-        state=state.astype(np.int32),
+        state=state,
         front=front,
         release_time=when,
         at_front=at_front,

@@ -123,8 +123,11 @@ class JumpSystem:
 
     def snapshot(self) -> tuple[Bools, Bools, list[SoftBond], float]:
         """What :meth:`restore` needs to return to the present states."""
-        return self.free.copy(), self.closed.copy(), [replace(b) for b in self.soft.bonds], (
-            self.soft.finished
+        return (
+            self.free.copy(),
+            self.closed.copy(),
+            [replace(b) for b in self.soft.bonds],
+            (self.soft.finished),
         )
 
     def restore(self, saved: tuple[Bools, Bools, list[SoftBond], float]) -> None:

@@ -250,24 +250,8 @@ class SoftSet:
         w = directions @ jump
         largest = np.array([w_ if b.largest is None else b.largest
                             for b, w_ in zip(self.bonds, w, strict=True)])  # fmt: skip
-        # a push along the unstable direction, towards opening
-        values, vectors = np.linalg.eigh(np.linalg.inv(compliance) - np.diag(strength / final))
-        push = vectors[:, 0] * (1.0 if vectors[:, 0].sum() >= 0.0 else -1.0)
-        w = w + 1e-6 * final * push / np.abs(push).max()
-        for _ in range(200_000):
-            self.snap_steps += 1
-            largest = np.maximum(largest, w)
-            reached = np.clip(largest, 0.0, final)
-            new = free_opening - compliance @ (strength * (1.0 - reached / final))
-            moved = np.abs(new - w) / final
-            w = new
-            if moved.max() < 1e-13:
-                break
-        else:
-            raise ConvergenceError(
-                f"softening bonds: no equilibrium after {self.snap_steps} lagged steps "
-                f"(last change {moved.max():.1e} of the final opening)"
-            )
+        w, largest, steps = downhill(free_opening, compliance, strength, final, w, largest)
+        self.snap_steps += steps
         gone = []
         for bond, now, most in zip(self.bonds, w, largest, strict=True):
             if most >= bond.final * (1.0 - 10.0 * _EVENT):
@@ -275,3 +259,102 @@ class SoftSet:
             else:
                 bond.largest = None if now >= most - 1e-9 * bond.final else float(most)
         return gone
+
+
+def downhill(
+    free_opening: Array,
+    compliance: Array,
+    strength: Array,
+    final: Array,
+    w: Array,
+    largest: Array,
+) -> tuple[Array, Array, int]:
+    """Openings after running downhill from an unstable equilibrium; w_max never heals.
+
+    Lagged steps  w <- free - C F(w_max)  lower the energy; they are stretched while that lowers
+    it further, and as soon as the bonds that still open are stable together, one Newton step
+    ends the search.
+
+    Args:
+        free_opening: Openings without any bond force, shape (n,), length.
+        compliance: C, openings per force, shape (n, n).
+        strength: F0, shape (n,).
+        final: w_f, shape (n,).
+        w: Present openings, shape (n,).
+        largest: w_max, shape (n,).
+
+    Returns:
+        Openings, largest openings, number of steps.
+
+    Raises:
+        ConvergenceError: No end was found.
+    """
+    stiffness = np.linalg.inv(compliance)
+    slope = strength / final
+
+    def force(most: Array) -> Array:
+        return np.asarray(strength * (1.0 - np.clip(most, 0.0, final) / final))
+
+    def energy(x: Array) -> float:
+        y = np.clip(np.maximum(largest, x), 0.0, final)
+        away = x - free_opening
+        bonds = strength * y * (1.0 - 0.5 * y / final) + force(y) * np.minimum(x - y, 0.0)
+        return float(0.5 * away @ stiffness @ away + bonds.sum())
+
+    # a push along the unstable direction, towards opening
+    _, vectors = np.linalg.eigh(stiffness - np.diag(slope))
+    push = vectors[:, 0] * (1.0 if vectors[:, 0].sum() >= 0.0 else -1.0)
+    w = w + 1e-6 * final * push / np.abs(push).max()
+    stretch = 1.0
+    for step in range(1, 20_000):
+        largest = np.maximum(largest, w)
+        new = free_opening - compliance @ force(largest)
+        if np.abs((new - w) / final).max() < 1e-13:
+            return new, np.maximum(largest, new), step
+        if step % 10 == 0:
+            ended = _newton(free_opening, compliance, strength, final, new, largest)
+            if ended is not None:
+                return ended, np.maximum(largest, ended), step
+        longer = w + 2.0 * stretch * (new - w)
+        if energy(longer) < energy(new):
+            new, stretch = longer, min(2.0 * stretch, 1e6)
+        else:
+            stretch = 1.0
+        w = new
+    raise ConvergenceError(
+        f"softening bonds: no equilibrium after {step} lagged steps "
+        f"(last change {np.abs((new - w) / final).max():.1e} of the final opening)"
+    )
+
+
+def _newton(
+    free_opening: Array,
+    compliance: Array,
+    strength: Array,
+    final: Array,
+    w: Array,
+    largest: Array,
+) -> Array | None:
+    """Equilibrium with the bonds that open at ``w`` on their softening branch, if it is one."""
+    opens = (w >= largest) & (w < final)
+    forces = strength * (1.0 - np.clip(largest, 0.0, final) / final)
+    forces[opens] = strength[opens]
+    root = np.sqrt(np.where(opens, strength / final, 0.0))
+    matrix = np.eye(len(w)) - root[:, None] * compliance * root
+    try:
+        np.linalg.cholesky(matrix)
+    except np.linalg.LinAlgError:
+        return None
+    # w = free - C (forces - slope w) on the opening ones, in symmetric variables root w
+    base = free_opening - compliance @ forces
+    scaled = np.linalg.solve(matrix, root * base)
+    found = base + compliance @ (root * scaled)
+    small = 1e-12 * final
+    if np.any(found[opens] < largest[opens] - small[opens]) or np.any(
+        found[opens] > final[opens] + small[opens]
+    ):
+        return None
+    rest = ~opens
+    if np.any((found > largest + small)[rest & (largest < final)]):
+        return None
+    return np.asarray(found)

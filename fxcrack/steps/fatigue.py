@@ -226,7 +226,18 @@ class FatigueState:
             self.waiting[p][front] = True
             self.credit[p] = np.zeros(n_nodes)
 
-    def note(self, **columns: Sequence[float | int | str | bool]) -> None:
-        """Add one entry per tip to every column of the table."""
-        for name in _COLUMNS:
-            self.table[name] += columns[name]
+    def note(
+        self,
+        N: float,
+        interface: str,
+        nodes: npt.NDArray[np.int64],
+        lengths: Sequence[float],
+        cycle: TipCycle,
+        released: Bools,
+    ) -> None:
+        """Add one entry per tip of an interface to every column of the table."""
+        n = len(nodes)
+        rates = [getattr(cycle, name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
+        columns = [[N] * n, [interface] * n, nodes.tolist(), lengths, *rates, released.tolist()]
+        for name, values in zip(_COLUMNS, columns, strict=True):
+            self.table[name] += values

@@ -7,7 +7,16 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria import EnhancedVCCT, RateCriterion, Release, Step
+from fxcrack.criteria import (
+    AmplitudeRelease,
+    CrackLengthVsTime,
+    CrackOpening,
+    CriticalStress,
+    EnhancedVCCT,
+    RateCriterion,
+    Release,
+    Step,
+)
 from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Tips
@@ -15,10 +24,12 @@ from fxcrack.interface.pairing import Interface
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
+from fxcrack.steps.evaluate_distance import OpeningEvaluator, StressEvaluator
+from fxcrack.steps.evaluate_length import LengthEvaluator
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
-Criterion = RateCriterion
+Criterion = RateCriterion | CriticalStress | CrackOpening | CrackLengthVsTime
 
 _TIE = 1e-6
 """Front nodes whose f lies within this fraction of the largest one are let go together."""
@@ -40,11 +51,29 @@ class Debond:
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""
-        if self.interface.normal_only and isinstance(self.criterion, RateCriterion):
+        where = f"interface '{self.interface.title}'"
+        name, law = type(self.criterion).__name__, type(self.release).__name__
+        if not isinstance(self.criterion, Criterion):
+            raise InputError(f"{where}: {name} is not a criterion; give VCCT or another of them")
+        if not isinstance(self.criterion, RateCriterion):
+            if not isinstance(self.release, Step | AmplitudeRelease):
+                raise InputError(
+                    f"{where}: {law} is not possible with {name}, which knows no toughness; "
+                    "release by Step or AmplitudeRelease"
+                )
+            if isinstance(self.criterion, CrackOpening):
+                self.criterion.check_bond(normal_only=self.interface.normal_only)
+            return
+        if self.interface.normal_only:
             raise InputError(
-                f"interface '{self.interface.title}': bonds in the normal direction only are not "
-                f"possible with {type(self.criterion).__name__}; bond in all directions, or use "
-                "a critical stress, opening or crack length criterion"
+                f"{where}: bonds in the normal direction only are not possible with {name}; bond "
+                "in all directions, or use a critical stress, opening or crack length criterion"
+            )
+        if isinstance(self.release, AmplitudeRelease):
+            raise InputError(
+                f"{where}: {law} is not possible with {name}; its bonds let go by Step, Ramp or "
+                "Progressive, an amplitude of time serves the critical stress, opening and crack "
+                "length criteria"
             )
 
 
@@ -135,5 +164,11 @@ class Growth:
 
 
 def make_evaluator(model: CondensedModel, p: int, criterion: Criterion) -> Evaluator:
-    """The evaluator that goes with a criterion."""
+    """The evaluator that goes with a criterion; collective."""
+    if isinstance(criterion, CriticalStress):
+        return StressEvaluator(model, p, criterion)
+    if isinstance(criterion, CrackOpening):
+        return OpeningEvaluator(model, p, criterion)
+    if isinstance(criterion, CrackLengthVsTime):
+        return LengthEvaluator(model, p, criterion)
     return RateEvaluator(model, p, criterion)

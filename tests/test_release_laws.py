@@ -1,0 +1,168 @@
+"""Letting go: progressive, enhanced, ramps; energy they dissipate and the saw-tooth they leave."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fxcrack as fx
+from fxcrack.criteria import Ramp
+from fxcrack.demos import enhanced_dcb, front3d
+from fxcrack.meshes.dcb import dcb_2d
+
+TOUGHNESS = 0.2
+
+
+def beam(release, criterion=None, *, dx=1.0, ny=2, comm=None, rows=None, contact=False):
+    """The bench specimen in 2-D, coarse."""
+    keywords = {} if comm is None else {"comm": comm}
+    mesh = dcb_2d(length=100.0, height=1.5, dx=dx, ny=ny, **keywords)
+    bond = fx.Interface(
+        slave="upper_face",
+        master="lower_face",
+        bonded=lambda x: x[0] >= 30.0 - 1e-9,
+        contact=contact,
+        name="bond",
+    )
+    scene = fx.Scene(
+        mesh,
+        materials=fx.Isotropic(70e3, 0.3),
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("pin_top", x=0.0, y=1.0),
+            fx.Displacement("pin_bottom", x=0.0, y=-1.0),
+        ],
+        debonds=[fx.Debond(bond, criterion or fx.VCCT(GIc=TOUGHNESS), release=release)],
+        options=fx.CondensedOptions(rows=rows),
+    )
+    return scene, bond
+
+
+def onsets(history):
+    """Rows at which f = 1."""
+    return [row for row in history if row["event"] == "onset"]
+
+
+@pytest.mark.mpi
+def test_progressive_release_dissipates_the_toughness(comm):
+    scene, bond = beam(fx.Progressive())
+    history = scene.run(fx.Static(until=fx.CrackLength(bond, 40.0)))
+    for row in onsets(history)[1:]:
+        # the law's area under the curve is G_c dA by construction; only round-off remains
+        assert row["released_energy"] == pytest.approx(TOUGHNESS * (row["a[bond]"] - 30.0), 1e-9)
+        assert abs(row["balance"]) <= 1e-9 * row["external_work"]
+    scene.close()
+
+
+def test_saw_tooth_is_at_least_five_times_smaller_than_that_of_step_release():
+    amplitude = {}
+    for name, release in (("step", fx.Step()), ("progressive", fx.Progressive())):
+        # increments far below the spacing of releases sample the path between them
+        scene, bond = beam(release)
+        step = fx.Static(
+            until=fx.CrackLength(bond, 40.0),
+            stepping="increment",
+            initial=2e-3,
+            maximum=2e-3,
+            minimum=1e-9,
+            max_cutbacks=30,
+        )
+        history = scene.run(step)
+        inside = (history["event"] == "increment") & (history["a[bond]"] > 32.0)
+        u, load = history["u[pin_top.y]"][inside], history["R[pin_top.y]"][inside]
+        smooth = np.polyval(np.polyfit(np.log(u), np.log(load), 3), np.log(u))
+        amplitude[name] = np.ptp(load / np.exp(smooth))
+        scene.close()
+    assert amplitude["progressive"] < amplitude["step"] / 5.0
+
+
+@pytest.mark.mpi
+def test_rebases_while_bonds_soften_change_nothing(comm):
+    histories = []
+    for rows in (None, 2.0):
+        scene, bond = beam(fx.Progressive(), rows=rows)
+        histories.append(scene.run(fx.Static(until=fx.CrackLength(bond, 38.0))))
+        factorizations = scene.model.timings.factorizations
+        scene.close()
+    assert factorizations > 2  # the short window did make it factor again
+    one, other = histories
+    assert len(one) == len(other)
+    for column in ("R[pin_top.y]", "u[pin_top.y]", "released_energy", "a[bond]"):
+        # two factorisations of the same matrices: condition number times round-off
+        np.testing.assert_allclose(one[column], other[column], rtol=1e-8, atol=1e-12)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("propagation", [0.2, 0.12])
+def test_enhanced_vcct_dissipates_the_propagation_toughness(comm, propagation):
+    scene, found = enhanced_dcb.run(propagation, dx=1.0, ny=2, until=40.0)
+    scene.close()
+    assert found["dissipated"] == pytest.approx(propagation, rel=1e-8)  # by the law's construction
+    assert found["balance"] < 1e-9  # linear pieces: only round-off
+
+
+def test_enhanced_vcct_with_equal_toughness_is_progressive_vcct():
+    one, bond = beam(fx.Step(), fx.EnhancedVCCT(GIc=TOUGHNESS, GIc_p=TOUGHNESS))
+    other, same = beam(fx.Progressive())
+    a = one.run(fx.Static(until=fx.CrackLength(bond, 36.0)))
+    b = other.run(fx.Static(until=fx.CrackLength(same, 36.0)))
+    np.testing.assert_allclose(a["R[pin_top.y]"], b["R[pin_top.y]"], rtol=1e-12)
+
+
+def test_softening_bond_unloads_along_its_secant_and_loads_again():
+    scene, bond = beam(fx.Progressive())
+    scene.run(fx.Static(until=fx.Releases(1)))
+    system = scene.model.system
+    top = scene.time
+    half = scene.model.state
+    # a little further, the bond is half open
+    for _, point in system.pieces(half, scene.loads_at(1.01 * top), np.zeros(system.n_window)):
+        half = point
+    (soft,) = system.soft.bonds
+    w, force = soft.opening(half.jump), soft.force(soft.opening(half.jump))
+    for _, point in system.pieces(half, 0.5 * half.loads, np.zeros(system.n_window)):
+        back = point
+    assert soft.largest == pytest.approx(w, rel=1e-9)
+    assert soft.force(soft.opening(back.jump)) == pytest.approx(
+        force * soft.opening(back.jump) / w, rel=1e-9
+    )
+    for _, point in system.pieces(back, half.loads, np.zeros(system.n_window)):
+        again = point
+    np.testing.assert_allclose(again.jump, half.jump, rtol=1e-7, atol=1e-12 * abs(half.jump).max())
+    scene.close()
+
+
+def test_ramp_with_opening_spends_the_closure_energy():
+    scene, bond = beam(Ramp())
+    history = scene.run(fx.Static(until=fx.CrackLength(bond, 36.0)))
+    last = onsets(history)[-1]
+    # at f = 1 the ramp's 1/2 F0 w_c is what crack closure calls G_c dA on an even mesh
+    assert last["released_energy"] == pytest.approx(TOUGHNESS * (last["a[bond]"] - 30.0), rel=1e-8)
+
+
+def test_ramp_over_increments_needs_increments():
+    scene, bond = beam(Ramp(increments=3))
+    with pytest.raises(fx.InputError, match="stepping='increment'"):
+        scene.run(fx.Static(until=fx.CrackLength(bond, 36.0)))
+    history = scene.run(
+        fx.Static(
+            until=fx.CrackLength(bond, 36.0), stepping="increment", initial=0.02, maximum=0.02
+        )
+    )
+    final = history.rows[-1]
+    assert final["a[bond]"] >= 36.0
+    assert abs(final["balance"]) < 1e-9 * final["external_work"]  # piecewise linear throughout
+
+
+@pytest.mark.slow
+def test_front_in_3d_keeps_its_energy_only_with_progressive_release():
+    step, found = front3d.run(fx.Step(), until=50.0)
+    step.close()
+    gradual, right = front3d.run(fx.Progressive(), until=50.0)
+    gradual.close()
+    # design.md section 12: step release carries 11 to 15 % less and spends 0.108 to 0.16
+    assert 0.84 < found["load / theory"] < 0.90
+    assert found["dissipated"] < 0.17
+    # progressive: G_c within 1.5 %; the coarse mesh is up to 6 % too stiff
+    assert right["dissipated"] == pytest.approx(TOUGHNESS, rel=0.015)
+    assert 1.0 < right["load / theory"] < 1.07
