@@ -10,6 +10,8 @@ from fxcrack.criteria import (
     CrackOpening,
     CriticalStress,
     EnhancedVCCT,
+    Fatigue,
+    Paris,
     Power,
     Progressive,
     Reeder,
@@ -32,9 +34,12 @@ from fxcrack.loads import (
 from fxcrack.materials import Isotropic, Orthotropic
 from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
 from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.output import plots
+from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.history import History
 from fxcrack.scene import Debond, Scene
 from fxcrack.solve.condensed import CondensedOptions
+from fxcrack.steps.fatigue import Cycles
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength, Releases, Time
 
@@ -54,9 +59,12 @@ __all__ = [
     "CrackLengthVsTime",
     "CrackOpening",
     "CriticalStress",
+    "Cycles",
     "Debond",
     "Displacement",
     "EnhancedVCCT",
+    "Fatigue",
+    "FieldSeries",
     "FxcrackError",
     "History",
     "InputError",
@@ -66,6 +74,7 @@ __all__ = [
     "Monitor",
     "OpeningRamp",
     "Orthotropic",
+    "Paris",
     "PlaneStrain",
     "PlaneStress",
     "PointForce",
@@ -84,6 +93,9 @@ __all__ = [
     "Time",
     "Traction",
     "compat",
+    "displacement_function",
     "mesh_from_gmsh",
+    "plots",
     "read_mesh",
+    "write_fields",
 ]

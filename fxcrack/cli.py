@@ -56,7 +56,7 @@ def _console() -> Console:
     return Console(quiet=MPI.COMM_WORLD.rank > 0, highlight=False)
 
 
-# -- demos -----------------------------------------------------------------------------------------
+# -- demos ---------------------------------------------------------------------------
 
 
 def demo_titles() -> dict[str, str]:
@@ -97,7 +97,7 @@ def demo(
     module.main(Path("out") / name if out is None else out, fine=fine)
 
 
-# -- benchmarks ------------------------------------------------------------------------------------
+# -- benchmarks ----------------------------------------------------------------------
 
 
 @app.command()
@@ -127,7 +127,7 @@ def bench(
             temporary.write_text(json.dumps(result, indent=1) + "\n")
 
 
-# -- information -----------------------------------------------------------------------------------
+# -- information ---------------------------------------------------------------------
 
 
 def information() -> dict[str, str]:
@@ -174,7 +174,7 @@ def info() -> None:
     _console().print(table)
 
 
-# -- errors and ranks ------------------------------------------------------------------------------
+# -- errors and ranks ----------------------------------------------------------------
 
 
 def main(argv: Sequence[str] | None = None) -> None:
@@ -205,6 +205,7 @@ def main(argv: Sequence[str] | None = None) -> None:
             print(message, file=sys.stderr, flush=True)
         if not together:
             comm.Abort(code if isinstance(code, int) else 1)
+    comm.Free()
     sys.exit(code)
 
 

@@ -81,12 +81,11 @@ class Continuum:
         self._parts = self._assign(materials)
         self._form: Any = None
 
-    def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any]]:
-        """Pairs (stiffness constant, measure), one per material."""
+    def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any, Any]]:
+        """Stiffness, stress per strain and measure, one triple per material."""
         domain, meta = self.mesh.domain, {"quadrature_degree": self._degree}
         if not isinstance(materials, Mapping):
-            c = fem.Constant(domain, self.model.reduce(materials.stiffness()))
-            return [(c, ufl.dx(domain, metadata=meta))]
+            return [(*self._constants(materials), ufl.dx(domain, metadata=meta))]
         n_cells = domain.topology.index_map(self.mesh.tdim).size_local
         count = np.zeros(n_cells, dtype=np.int32)
         cells, values = [], []
@@ -107,10 +106,15 @@ class Continuum:
         sort = np.argsort(entities)
         marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])
         dx = ufl.Measure("dx", domain=domain, subdomain_data=marks, metadata=meta)
-        return [
-            (fem.Constant(domain, self.model.reduce(m.stiffness())), dx(i + 1))
-            for i, m in enumerate(materials.values())
-        ]
+        return [(*self._constants(m), dx(i + 1)) for i, m in enumerate(materials.values())]
+
+    def _constants(self, material: Material) -> tuple[Any, Any]:
+        """Stiffness on the strains of the model, and all its stresses per unit strain."""
+        domain, c = self.mesh.domain, material.stiffness()
+        return (
+            fem.Constant(domain, self.model.reduce(c)),
+            fem.Constant(domain, self.model.recover(c)),
+        )
 
     def compile(self) -> None:
         """Compile the stiffness form (cached on disk by DOLFINx); assembly does it otherwise."""
@@ -118,7 +122,7 @@ class Continuum:
             u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
             eu, ev = self.model.strain(u, self._x), self.model.strain(v, self._x)
             self._form = fem.form(
-                sum(ufl.inner(ufl.dot(c, eu), ev) * self._weight * dx for c, dx in self._parts)
+                sum(ufl.inner(ufl.dot(c, eu), ev) * self._weight * dx for c, _, dx in self._parts)
             )
 
     def stiffness(self) -> PETSc.Mat:
@@ -212,20 +216,20 @@ class Continuum:
         return np.asarray(self.space.tabulate_dof_coordinates())
 
     def stress(self, u: fem.Function) -> fem.Function:
-        """Cell averages of the stress, components in the order of ``model.labels``."""
-        n = len(self.model.labels)
+        """Cell averages of the stress, components in the order of ``model.stress_labels``."""
+        n = len(self.model.stress_labels)
         element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
         space = fem.functionspace(self.mesh.domain, element)
-        trial, test = ufl.TrialFunction(space), ufl.TestFunction(space)
+        test = ufl.TestFunction(space)
         strain = self.model.strain(u, self._x)
         volume = dolfinx.fem.petsc.assemble_vector(
             fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self._weight * ufl.dx)
         )
         sigma = sum(
-            ufl.inner(ufl.dot(c, strain), test) * self._weight * dx for c, dx in self._parts
+            ufl.inner(ufl.dot(recover, strain), test) * self._weight * dx
+            for _, recover, dx in self._parts
         )
         integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
-        del trial
         out = fem.Function(space, name="stress")
         local = len(volume.array)
         out.x.array[:local] = integral.array / volume.array
@@ -235,15 +239,11 @@ class Continuum:
         return out
 
     def von_mises(self, stress: fem.Function) -> fem.Function:
-        """Von Mises stress per cell; plane strain uses the in-plane components' exact s_zz."""
-        labels = self.model.labels
+        """Von Mises stress per cell, of the cell averages of the stress."""
+        labels = self.model.stress_labels
         s = stress.x.array.reshape(-1, len(labels))
-        column = {name: s[:, i] for i, name in enumerate(labels)}
-        zero = np.zeros(len(s))
-        a = column.get("xx", column.get("rr", zero))
-        b = column.get("yy", column.get("zz", zero))
-        c = column.get("tt", column["zz"] if self.gdim == 3 else zero)
-        shears = [column[k] for k in ("xy", "rz", "yz", "xz") if k in column]
+        a, b, c = s[:, :3].T  # the normal stresses come first in every model
+        shears = s[:, 3:].T
         space = fem.functionspace(self.mesh.domain, ("DG", 0))
         out = fem.Function(space, name="von_mises")
         out.x.array[:] = np.sqrt(

@@ -1,8 +1,9 @@
 """Kinematic models: which strains a body has, and what an element of area stands for.
 
 Each model turns a displacement into a Voigt strain vector (engineering shears), reduces the
-6 x 6 stiffness to it, and names the weight of the volume and surface integrals:
-thickness in plane models, 2 pi r for a full ring, 1 in three dimensions.
+6 x 6 stiffness to it, recovers the stresses out of its plane with the others, and names the weight
+of the volume and surface integrals: thickness in plane models, 2 pi r for a full ring, 1 in three
+dimensions.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ class _Plane:
     thickness: float = 1.0
     gdim: ClassVar[int] = 2
     labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "xy")
+    stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "xy")
 
     def __post_init__(self) -> None:
         if not self.thickness > 0.0:
@@ -51,6 +53,10 @@ class PlaneStrain(_Plane):
         keep = [0, 1, 5]
         return c[np.ix_(keep, keep)]
 
+    def recover(self, c: Array) -> Array:
+        """Stress (xx, yy, zz, xy) per unit strain, shape (4, 3); zz keeps the slice flat."""
+        return c[np.ix_([0, 1, 2, 5], [0, 1, 5])]
+
 
 @dataclass(frozen=True)
 class PlaneStress(_Plane):
@@ -62,6 +68,10 @@ class PlaneStress(_Plane):
         inner = np.linalg.solve(c[np.ix_(drop, drop)], c[np.ix_(drop, keep)])
         return np.asarray(c[np.ix_(keep, keep)] - c[np.ix_(keep, drop)] @ inner)
 
+    def recover(self, c: Array) -> Array:
+        """Stress (xx, yy, zz, xy) per unit strain, shape (4, 3); zz is zero."""
+        return np.insert(self.reduce(c), 2, 0.0, axis=0)
+
 
 @dataclass(frozen=True)
 class Axisymmetric:
@@ -72,6 +82,7 @@ class Axisymmetric:
 
     gdim: ClassVar[int] = 2
     labels: ClassVar[tuple[str, ...]] = ("rr", "zz", "tt", "rz")
+    stress_labels: ClassVar[tuple[str, ...]] = labels
 
     def strain(self, u: Any, x: Any) -> Any:
         """Voigt strain (rr, zz, hoop, rz) of a UFL displacement."""
@@ -81,6 +92,10 @@ class Axisymmetric:
         """Stiffness of (rr, zz, hoop, rz), shape (4, 4)."""
         keep = [0, 1, 2, 5]
         return c[np.ix_(keep, keep)]
+
+    def recover(self, c: Array) -> Array:
+        """Stress (rr, zz, hoop, rz) per unit strain, shape (4, 4)."""
+        return self.reduce(c)
 
     def weight(self, x: Any) -> Any:
         """Factor of the area element: 2 pi r, length."""
@@ -97,6 +112,7 @@ class Solid:
 
     gdim: ClassVar[int] = 3
     labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "yz", "xz", "xy")
+    stress_labels: ClassVar[tuple[str, ...]] = labels
 
     def strain(self, u: Any, x: Any) -> Any:
         """Voigt strain (xx, yy, zz, yz, xz, xy) of a UFL displacement."""
@@ -113,6 +129,10 @@ class Solid:
 
     def reduce(self, c: Array) -> Array:
         """The whole stiffness, shape (6, 6)."""
+        return c
+
+    def recover(self, c: Array) -> Array:
+        """Stress per unit strain: the stiffness, shape (6, 6)."""
         return c
 
     def weight(self, x: Any) -> Any:

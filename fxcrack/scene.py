@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -16,11 +17,14 @@ from fxcrack.loads import Displacement, Load, Monitor
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
 from fxcrack.models import Model
-from fxcrack.output.history import History
+from fxcrack.output.history import History, Row
 from fxcrack.output.progress import Progress
 from fxcrack.solve.condensed import CondensedModel, CondensedOptions
+from fxcrack.steps.cycle_march import CycleMarch
+from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
 from fxcrack.steps.growth import Debond, Growth
-from fxcrack.steps.march import March
+from fxcrack.steps.letting_go import TimedRelease, given_forces
+from fxcrack.steps.march import March, Observer
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength
 
@@ -87,6 +91,9 @@ class Scene:
         self._work = 0.0
         self._released = 0.0
         self._snapped = 0.0
+        self._ramps: list[TimedRelease] = []
+        self._increment = 0
+        self.fatigue = FatigueState()
         self.history = History(mesh.comm)
         self._started = False
 
@@ -102,10 +109,11 @@ class Scene:
 
     def run(
         self,
-        step: Static,
+        step: Static | Cycles,
         *,
         grow: Sequence[Debond] | None = None,
         progress: bool = True,
+        observers: Sequence[Observer] = (),
     ) -> History:
         """Run a step and return the history of all steps so far; collective.
 
@@ -113,6 +121,8 @@ class Scene:
             step: What to do and when to stop.
             grow: Debonds that may grow in this step; all by default. The others stay tied.
             progress: Show load, crack length and f while running (on a terminal only).
+            observers: Called on all ranks with the name of every event and its row of the
+                history, e.g. :class:`fxcrack.output.fields.FieldSeries`.
         """
         chosen = self.debonds if grow is None else list(grow)
         for debond in chosen:
@@ -120,6 +130,7 @@ class Scene:
                 raise InputError(
                     f"debond of interface '{debond.interface.title}' is not part of the scene"
                 )
+        check_criteria(step, chosen)
         active = [d in chosen for d in self.debonds]
         active += [False] * (len(self.pairs) - len(self.debonds))
         if not self._started:
@@ -142,24 +153,28 @@ class Scene:
             self._started = True
         else:
             # another window: the same equilibrium in its components
-            self.model.solve(np.zeros(self.model.system.n_window))
+            self.model.solve(given_forces(self.model, self._ramps, self.time, self._increment))
         with Progress(self.mesh.comm, enabled=progress) as show:
-            march = March(
-                self.model,
+            every: list[Observer] = [show, *observers]
+
+            def tell(event: str, row: Row) -> None:
+                for observe in every:
+                    observe(event, row)
+
+            march = self._march(
                 growths,
                 step,
-                self.history,
-                self.loads_at,
-                self._breaks(),
                 time=self.time,
                 work=self._work,
                 released=self._released,
                 snapped=self._snapped,
-                observer=show,
+                ramps=self._ramps,
+                increment=self._increment,
+                observer=tell,
             )
             self.history.reason = march.run()
         self.time, self._work, self._released = march.time, march.work, march.released
-        self._snapped = march.snapped
+        self._snapped, self._increment = march.snapped, march.increment
         self.history.details = {
             "dofs": self.continuum.n_global,
             "window": self.model.system.n_window,
@@ -169,7 +184,16 @@ class Scene:
             "contact_steps": self.model.system.contact_steps,
             "seconds": dict(self.model.timings.seconds),
         }
+        if self.fatigue.table["N"]:
+            self.history.details["tips"] = self.fatigue.table
         return self.history
+
+    def _march(self, growths: list[Growth], step: Static | Cycles, **carried: Any) -> March:
+        common = self.history, self.loads_at, self._breaks()
+        if isinstance(step, Cycles):
+            carried["fatigue"] = self.fatigue
+            return CycleMarch(self.model, growths, step, *common, **carried)
+        return March(self.model, growths, step, *common, **carried)
 
     def _jump_to(self, loads: Array) -> None:
         """Apply loads that are there from the first moment."""
@@ -177,7 +201,7 @@ class Scene:
             f"loads are not zero at time 0 (amplitudes {loads}); let amplitudes start at 0"
         )
 
-    def _reach(self, step: Static) -> list[float]:
+    def _reach(self, step: Static | Cycles) -> list[float]:
         """How far each crack may grow in a step, length."""
         out = [np.inf] * len(self.pairs)
         for end in step.ends:

@@ -291,9 +291,9 @@ def test_files_hold_the_fields(kind: str, comm: MPI.Comm, shared_path: Path) -> 
     wanted, there = np.hstack([x, moved]), np.hstack([mine["Points"], mine["displacement"]])
     if n_owned:
         distance = np.abs(wanted[:, None] - there[None]).max(axis=2).min(axis=1)
-        assert distance.max() == 0.0
+        assert distance.max() < 1e-12  # two back-solves differ by round-off on several ranks
     labels = mine["names"]
-    assert sorted(labels) == sorted(scene.continuum.model.labels)
+    assert sorted(labels) == sorted(scene.continuum.model.stress_labels)
     if len(labels) == 6:  # as VTK takes a symmetric tensor
         assert labels == ["xx", "yy", "zz", "xy", "yz", "xz"]
     assert mine["stress"].shape == (len(mine["types"]), len(labels))
@@ -305,7 +305,6 @@ def test_files_hold_the_fields(kind: str, comm: MPI.Comm, shared_path: Path) -> 
     np.testing.assert_array_equal(bond["offsets"][-1], pair.surface.facets.size)
     np.testing.assert_array_equal(bond["bond_state"], surface.state)
     np.testing.assert_array_equal(bond["front"], surface.front)
-    # a second back-solve on the same factors gives the same bits or nearly so
     for name in ("opening", "displacement"):
         np.testing.assert_allclose(bond[name], getattr(surface, name), atol=1e-12)
     np.testing.assert_allclose(bond["bond_traction"], surface.traction, atol=1e-8)
@@ -315,11 +314,14 @@ def test_files_hold_the_fields(kind: str, comm: MPI.Comm, shared_path: Path) -> 
 
 
 @pytest.mark.mpi
-def test_uniform_tension_is_found_in_the_file(comm: MPI.Comm, shared_path: Path) -> None:
+@pytest.mark.parametrize("model", [fx.PlaneStress(), fx.PlaneStrain()])
+def test_uniform_tension_is_found_in_the_file(
+    model: fx.PlaneStress | fx.PlaneStrain, comm: MPI.Comm, shared_path: Path
+) -> None:
     scene = fx.Scene(
         dcb_2d(length=20.0, dx=1.0, ny=2),
         materials=STEEL,
-        model=fx.PlaneStress(),
+        model=model,
         supports=[fx.Displacement("bottom", y=0.0), fx.Displacement("pin_bottom", x=0.0)],
         loads=[fx.Traction("top", (0.0, 5.0))],
         bonds=[fx.Interface("upper_face", "lower_face", name="glue line 1/2")],
@@ -328,10 +330,14 @@ def test_uniform_tension_is_found_in_the_file(comm: MPI.Comm, shared_path: Path)
     write_fields(scene, shared_path / "a.pvd", time=7.0)
     ((time, pieces),) = read_bodies(shared_path / "a.pvd")
     assert time == 7.0
+    # plane strain holds the thickness with nu times the tension
+    out_of_plane = 0.3 * 5.0 if isinstance(model, fx.PlaneStrain) else 0.0
+    equivalent = np.sqrt(5.0**2 - 5.0 * out_of_plane + out_of_plane**2)
     for piece in pieces:
-        column = piece["names"].index("yy")
-        np.testing.assert_allclose(piece["stress"][:, column], 5.0, rtol=1e-9)
-        np.testing.assert_allclose(piece["von_mises"], 5.0, rtol=1e-9)
+        assert piece["names"] == ["xx", "yy", "zz", "xy"]
+        wanted = np.broadcast_to([0.0, 5.0, out_of_plane, 0.0], piece["stress"].shape)
+        np.testing.assert_allclose(piece["stress"], wanted, atol=1e-8)
+        np.testing.assert_allclose(piece["von_mises"], equivalent, rtol=1e-9)
     ((_, (bond,)),) = read_bodies(shared_path / "a_glue_line_1_2.pvd")
     np.testing.assert_allclose(bond["bond_traction"][:, 1], 5.0, rtol=1e-9)
     scene.close()
@@ -361,6 +367,21 @@ def test_series_as_an_observer(comm: MPI.Comm, shared_path: Path) -> None:
         FieldSeries(scene, "fields.vtu")
     with pytest.raises(fx.InputError, match="every = 0"):
         FieldSeries(scene, path, every=0)
+    scene.close()
+
+
+@pytest.mark.mpi
+def test_series_follows_a_run(shared_path: Path) -> None:
+    scene = cracked()
+    (bond,) = (d.interface for d in scene.debonds)
+    with FieldSeries(scene, shared_path / "run.pvd", events=("release",)) as series:
+        history = scene.run(fx.Static(until=fx.CrackLength(bond, 13.0)), observers=[series])
+    steps = read_bodies(shared_path / "run_bond.pvd")
+    rows = [r for r in history if r["event"] == "release" and r["released[bond]"] > 3]
+    assert [time for time, _ in steps] == [r["time"] for r in rows]
+    for (_, (surface,)), row in zip(steps, rows, strict=True):
+        assert np.count_nonzero(surface["bond_state"] == 0.0) == 8 + row["released[bond]"]
+        assert surface["GI"].max() == pytest.approx(row["GI[bond]"])
     scene.close()
 
 

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from fxcrack.errors import InterfaceError
 from fxcrack.interface.surface import FacetSurface
+from fxcrack.mesh.raw import place
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -88,8 +89,7 @@ class Front:
         title: Name of the interface in messages.
 
     Raises:
-        InterfaceError: A second-order tip starts at a midside node, or the facets are
-            second-order triangles.
+        InterfaceError: A second-order tip starts at a midside node.
     """
 
     def __init__(self, surface: FacetSurface, bonded: Bools, title: str) -> None:
@@ -102,12 +102,9 @@ class Front:
         flat = np.argsort(facets.ravel(), kind="stable")
         counts = np.bincount(facets.ravel(), minlength=surface.n_nodes)
         self._facets_of = np.split(flat // facets.shape[1], np.cumsum(counts)[:-1])
-        if surface.order == 2 and surface.kind not in _LINES:
-            raise InterfaceError(
-                f"interface '{title}' has second-order triangular faces: no crack-closure unit "
-                "is defined on them; use first-order tetrahedra or second-order hexahedra"
-            )
-        pattern = _EDGES[surface.kind] if surface.order == 1 else _LINES[surface.kind]
+        # second-order triangles may be tied, but no crack-closure unit is defined on them
+        self._has_units = surface.order == 1 or surface.kind in _LINES
+        pattern = (_EDGES if surface.order == 1 else _LINES).get(surface.kind, ((0, 3, 1),))
         ends = np.concatenate([facets[:, [e[0], e[-1]]] for e in pattern])
         middle = (
             np.concatenate([facets[:, e[1]] for e in pattern])
@@ -130,6 +127,8 @@ class Front:
 
     def _check_middles(self, facets: Ints) -> None:
         """The open part must cover whole element faces, so midside nodes follow their ends."""
+        if not self._has_units:
+            return
         if self.surface.dim == 2:
             # midsides of edges from corners first, then centres from midsides
             for first, middle, last in _LINES[self.surface.kind]:
@@ -142,7 +141,7 @@ class Front:
                 ends == 2
             )
             if np.any(wrong):
-                where = self.surface.x[facets[np.argmax(wrong), 2]]
+                where = place(self.surface.x[facets[np.argmax(wrong), 2]])
                 raise InterfaceError(
                     f"interface '{self.title}': the tip at {where} is a midside node; on "
                     "second-order faces the open part must cover whole element faces, "
@@ -182,7 +181,17 @@ class Front:
         return np.asarray(self._links[node][:, 0])
 
     def candidates(self) -> Ints:
-        """Front nodes, ascending."""
+        """Front nodes, ascending.
+
+        Raises:
+            InterfaceError: The faces are second-order triangles.
+        """
+        if not self._has_units:
+            raise InterfaceError(
+                f"interface '{self.title}' has second-order triangular faces: no crack-closure "
+                "unit is defined on them; use first-order tetrahedra or second-order hexahedra, "
+                "or tie it (Scene(bonds=...))"
+            )
         bonded = np.flatnonzero(self.bonded & ~self._is_middle)
         if not hasattr(self, "_near"):
             self._near = self._pad_links()

@@ -25,6 +25,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, InterfaceError, agree
 from fxcrack.interface.pairing import Pair
 from fxcrack.loads import Displacement
+from fxcrack.mesh.raw import place
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -107,8 +108,8 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
                 first = int(np.argmax(taken & differs))
                 problem = (
                     f"supports '{support.title}.{axis}' and '{columns[which[dofs[first]]].title}' "
-                    f"prescribe different values or amplitudes at {x[nodes[first]]}; let only one "
-                    "of them hold that node"
+                    f"prescribe different values or amplitudes at {place(x[nodes[first]])}; "
+                    "let only one of them hold that node"
                 )
             free = ~taken
             which[dofs[free]], value[dofs[free]] = len(columns), values[free]
@@ -202,7 +203,7 @@ def align_frames(
                     title = supports.columns[columns[node].max()].title
                     raise InterfaceError(
                         f"support '{title}' holds slave node {node} of interface '{pair.title}' "
-                        f"at {pair.surface.x[node]} in a direction oblique to the interface; "
+                        f"at {place(pair.surface.x[node])} in a direction oblique to it; "
                         "hold it along the interface or across it, or end the support before it"
                     )
         frames.append(frame)
@@ -248,9 +249,9 @@ class _Replica:
 
 def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -> bool:
     """Whether two prescribed dofs always have the same displacement."""
-    if not a.moves and not b.moves:
+    one, other = (c.scale * at if c.moves else 0.0 for c, at in ((a, at_a), (b, at_b)))
+    if one == other == 0.0:
         return True
-    one, other = a.scale * at_a, b.scale * at_b
     return a.support.amplitude == b.support.amplitude and abs(one - other) <= 1e-12 * abs(one)
 
 
@@ -271,8 +272,8 @@ def _check_slaves(
             dof = int(pair.surface.dofs[node])
             if dof in seen:
                 raise InterfaceError(
-                    f"the node at {pair.surface.x[node]} is a slave of interface '{seen[dof]}' "
-                    f"and of '{pair.title}'; a node can be a slave only once: "
+                    f"the node at {place(pair.surface.x[node])} is a slave of interface "
+                    f"'{seen[dof]}' and of '{pair.title}'; a node can be a slave only once: "
                     "let the surfaces end before each other or exchange slave and master of one"
                 )
             seen[dof] = pair.title
@@ -285,17 +286,17 @@ def _check_slaves(
                 continue
             if pair.bonded[node]:
                 raise InterfaceError(
-                    f"support '{column.title}' holds the slave node at {pair.surface.x[node]} of "
-                    f"interface '{pair.title}', but not its master nodes in the same way; "
-                    "support both faces there alike, or end the support or the interface "
-                    "before each other"
+                    f"support '{column.title}' holds the slave node at "
+                    f"{place(pair.surface.x[node])} of interface '{pair.title}', but not its "
+                    "master nodes in the same way; support both faces there alike, or end the "
+                    "support or the interface before each other"
                 )
             taking_part[node] = False
             if pair.interface.contact:
                 log.warn(
                     "interface '%s': no contact at the node at %s, which support '%s' holds",
                     pair.title,
-                    pair.surface.x[node],
+                    place(pair.surface.x[node]),
                     column.title,
                 )
 

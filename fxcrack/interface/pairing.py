@@ -18,6 +18,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, InterfaceError
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface, gather_surface
+from fxcrack.mesh.raw import place
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -176,7 +177,7 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
         i = int(np.argmax(np.where(lost, foot.distance, -1.0)))
         raise InterfaceError(
             f"{where}: {int(lost.sum())} bonded slave nodes lie outside the master surface "
-            f"'{interface.master}', the farthest at {slave.x[i]} by {foot.distance[i]:.3g} "
+            f"'{interface.master}', the farthest at {place(slave.x[i])} by {foot.distance[i]:.3g} "
             f"(search tolerance {tolerance:.3g}); let the master surface extend under them, "
             "take them out of the bonded set, or raise Interface(tolerance=...)"
         )

@@ -125,8 +125,10 @@ def distinct(rows: Ints, n_vertices: int) -> tuple[Ints, Ints]:
 
 
 def place(point: npt.ArrayLike) -> str:
-    """A point as messages show it."""
-    return "(" + ", ".join(f"{float(x):.6g}" for x in np.ravel(point)) + ")"
+    """A point as messages show it; round-off counts as 0."""
+    x = np.ravel(point)
+    x = np.where(np.abs(x) <= 1e-12 * np.abs(x).max(initial=0.0), 0.0, x)
+    return "(" + ", ".join(f"{v:.6g}" for v in x.tolist()) + ")"
 
 
 def check_shapes(raw: RawMesh) -> None:

@@ -91,7 +91,7 @@ def shape(scene: Scene, component: str = "von_mises") -> Shape:
 
     Args:
         scene: The scene, after a step.
-        component: "von_mises" or one of ``scene.continuum.model.labels``.
+        component: "von_mises" or one of ``scene.continuum.model.stress_labels``.
 
     Returns:
         The shape on rank 0; on the others their own part.
@@ -100,7 +100,7 @@ def shape(scene: Scene, component: str = "von_mises") -> Shape:
         InputError: The component is unknown, or no step was run yet.
     """
     continuum, comm = scene.continuum, scene.mesh.comm
-    labels = list(continuum.model.labels)
+    labels = list(continuum.model.stress_labels)
     if component != "von_mises" and component not in labels:
         unknown_name("stress component", component, ["von_mises", *labels])
     u = displacement_function(scene)

@@ -54,7 +54,7 @@ def body_grid(scene: Scene, u: fem.Function) -> Grid:
     width = continuum.space.dofmap.dof_layout.num_dofs
     cells = np.asarray(topology).reshape(-1, width + 1)[:, 1:]
     nodes, renumbered = np.unique(cells, return_inverse=True)
-    labels = list(continuum.model.labels)
+    labels = list(continuum.model.stress_labels)
     order = list(range(len(labels)))
     if continuum.gdim == 3:  # as VTK orders a symmetric tensor
         order = [labels.index(k) for k in ("xx", "yy", "zz", "xy", "yz", "xz")]

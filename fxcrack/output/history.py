@@ -21,6 +21,7 @@ from mpi4py import MPI
 
 from fxcrack.errors import unknown_name
 from fxcrack.output.atomic import replacing
+from fxcrack.output.collective import together
 
 Row = dict[str, float | int | str]
 
@@ -87,20 +88,20 @@ class History:
 
     def to_csv(self, path: str | Path) -> None:
         """Write all rows as comma-separated values; collective, rank 0 writes."""
-        if self._comm.rank == 0:
-            with replacing(path) as temporary, temporary.open("w", newline="") as stream:
-                writer = csv.DictWriter(stream, self.columns)
-                writer.writeheader()
-                writer.writerows(self.rows)
-        self._comm.Barrier()
+        with together(self._comm, f"writing {path}"):
+            if self._comm.rank == 0:
+                with replacing(path) as temporary, temporary.open("w", newline="") as stream:
+                    writer = csv.DictWriter(stream, self.columns)
+                    writer.writeheader()
+                    writer.writerows(self.rows)
 
     def to_json(self, path: str | Path) -> None:
         """Write rows, reason and details as JSON; collective, rank 0 writes."""
-        if self._comm.rank == 0:
-            content = {"reason": self.reason, "details": self.details, "rows": self.rows}
-            with replacing(path) as temporary:
-                temporary.write_text(json.dumps(content, indent=1))
-        self._comm.Barrier()
+        with together(self._comm, f"writing {path}"):
+            if self._comm.rank == 0:
+                content = {"reason": self.reason, "details": self.details, "rows": self.rows}
+                with replacing(path) as temporary:
+                    temporary.write_text(json.dumps(content, indent=1))
 
     def plot(
         self,

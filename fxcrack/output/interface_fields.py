@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+_ROUND_OFF = 1e-9
+"""Forces below this fraction of the largest bond force count as zero."""
+
 
 @dataclass(frozen=True)
 class InterfaceFields:
@@ -64,18 +67,10 @@ def residual(scene: Scene, u: fem.Function) -> Array:
     Returns:
         Shape (n_local,), the owned dofs of this rank, force.
     """
-    continuum, factors = scene.continuum, scene.model.state.loads
-    stiffness = continuum.stiffness()
-    out = stiffness.createVecLeft()
-    stiffness.mult(u.x.petsc_vec, out)
-    stiffness.destroy()
-    for load, factor in zip(scene.loads, factors[len(factors) - len(scene.loads) :], strict=True):
-        pattern = continuum.load_vector(load)
-        out.axpy(-factor, pattern)
-        pattern.destroy()
-    values = out.array.copy()
-    out.destroy()
-    return np.asarray(values)
+    vector = scene.model.nodal_forces(u.x.petsc_vec)
+    values = np.array(vector.array)
+    vector.destroy()
+    return values
 
 
 def _shared(continuum: Continuum, blocks: Ints, owned: Array) -> Array:
@@ -156,8 +151,9 @@ def _fields_of(
     bond = np.einsum("nck,nk->nc", model.frames[p], local)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
     bonded, index = model.fronts[p].bonded, model.index[p]
-    given = np.append(model.state.force, 0.0)  # components outside the window have index -1
-    letting_go = ~bonded & (given[index] != 0.0).any(axis=1)
+    given = np.append(np.abs(model.state.force), 0.0)[index]  # outside the window the index is -1
+    largest = np.abs(local).max(initial=0.0)
+    letting_go = ~bonded & (given > _ROUND_OFF * largest).any(axis=1)
     state = np.where(bonded, 1.0, np.where(letting_go, 0.5, 0.0))
     state[~pair.paired] = -1.0
     front = np.zeros(surface.n_nodes, dtype=np.int32)

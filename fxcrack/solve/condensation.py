@@ -22,7 +22,14 @@ from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, SolverError
 from fxcrack.interface.jumps import JumpCoordinates
 from fxcrack.loads import Load, Monitor
-from fxcrack.solve.petsc_schur import SchurFactor, library, mumps_message
+from fxcrack.solve.petsc_schur import (
+    TOO_SMALL,
+    WORKSPACE,
+    SchurFactor,
+    factor_problem,
+    library,
+    mumps_message,
+)
 
 Array = npt.NDArray[np.float64]
 
@@ -186,23 +193,45 @@ class Condensation:
             block = self.matrix.createSubMatrix(inner, inner)
             block.setOption(PETSc.Mat.Option.SYMMETRIC, True)
             block.setOption(PETSc.Mat.Option.SPD, True)
-            solver = PETSc.KSP().create(self._comm)
-            solver.setOptionsPrefix("fxcrack_inner_")
-            solver.setOperators(block)
-            solver.setType(PETSc.KSP.Type.PREONLY)
-            solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
             if PETSc.Sys.hasExternalPackage("mumps"):
-                solver.getPC().setFactorSolverType("mumps")
-            elif self._comm.size > 1:
-                solver.getPC().setType(PETSc.PC.Type.LU)
-                solver.getPC().setFactorSolverType("superlu_dist")
-            solver.setUp()
+                solver = self._mumps_solver(block)
+            else:
+                solver = self._direct_solver(block)
+                if self._comm.size > 1:
+                    solver.getPC().setType(PETSc.PC.Type.LU)
+                    solver.getPC().setFactorSolverType("superlu_dist")
+                solver.setUp()
             inner.destroy()
             last.destroy()
             self._inner, self._inner_matrix = solver, block
             self.timings.factorizations += 1
             self.timings.add("factor_inner", start)
         return self._inner
+
+    def _direct_solver(self, block: PETSc.Mat) -> PETSc.KSP:
+        solver = PETSc.KSP().create(self._comm)
+        solver.setOptionsPrefix("fxcrack_inner_")
+        solver.setOperators(block)
+        solver.setType(PETSc.KSP.Type.PREONLY)
+        solver.getPC().setType(PETSc.PC.Type.CHOLESKY)
+        return solver
+
+    def _mumps_solver(self, block: PETSc.Mat) -> PETSc.KSP:
+        for extra in WORKSPACE:
+            solver = self._direct_solver(block)
+            solver.getPC().setFactorSolverType("mumps")
+            solver.getPC().setFactorSetUpSolverType()
+            factor = solver.getPC().getFactorMatrix()
+            factor.setMumpsIcntl(14, extra)
+            solver.setUp()
+            problem = factor_problem(factor.getMumpsInfog, factor.getMumpsRinfog)
+            if problem is None:
+                return solver
+            enough = factor.getMumpsInfog(1) not in TOO_SMALL
+            solver.destroy()
+            if enough:
+                break
+        raise SolverError(problem)
 
     def _columns(self, block_size: int = 64) -> Array:
         """S by solves with blocks of right-hand sides: same result, slower."""

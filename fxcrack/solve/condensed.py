@@ -60,6 +60,8 @@ class CondensedModel:
         fronts: Fronts per pair.
         system: The dense system of the present window.
         state: Present equilibrium.
+        around: Distances ahead of and behind the tips that the criterion looks at, per pair.
+        keep: (pair, slave node) of bonds that still carry a given force.
         timings: Seconds per phase and number of factorisations.
     """
 
@@ -85,6 +87,7 @@ class CondensedModel:
         self.reach = [np.inf] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
+        self.keep: list[tuple[int, int]] = []
         self._soft: list[SoftBond] = []
         self._taken = 0.0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
@@ -128,7 +131,7 @@ class CondensedModel:
             reach,
             self._cost,
             around=self.around,
-            keep=[b.where[:2] for b in self._soft],
+            keep=[*(b.where[:2] for b in self._soft), *self.keep],
             cap_mb=self.options.window_mb,
             gdim=self.continuum.gdim,
         )
@@ -410,6 +413,25 @@ class CondensedModel:
         last[: self.system.n_window] = state.jump
         last[self.system.n_window : self.system.n_window + self.n_loads] = state.loads
         return self._condensation.displacement(last)
+
+    def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Forces of interfaces and supports on the bodies, K u - f.
+
+        Collective; the caller destroys the vector.
+
+        Args:
+            u: Displacements of the state, from :meth:`displacement`.
+            state: The state whose loads act; the present one by default.
+        """
+        state = self.state if state is None else state
+        assert self._stiffness is not None
+        out = self._stiffness.createVecLeft()
+        self._stiffness.mult(u, out)
+        # the first borders are the force patterns with the minus sign; monitors follow
+        factors = state.loads[self.n_loads - len(self.loads) :]
+        for factor, border in zip(factors, self._borders, strict=False):
+            out.axpy(float(factor), border)
+        return out
 
     def destroy(self) -> None:
         """Free all PETSc objects; collective."""

@@ -328,6 +328,11 @@ class JumpSystem:
         stuck = done = 0
         while True:
             if self.soft.bonds and not self.soft.stable():
+                done += 1
+                if done > 4 * self.n_window + 20:
+                    raise ConvergenceError(
+                        f"{len(self.soft.bonds)} softening bonds stay unstable at one load"
+                    )
                 last = self._pass_unstable(last)
                 yield here, last
                 continue

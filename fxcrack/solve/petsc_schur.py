@@ -10,6 +10,7 @@ several; the other is mirrored here. PETSc wants all Schur rows on rank 0.
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -21,8 +22,12 @@ from fxcrack.errors import SolverError
 Array = npt.NDArray[np.float64]
 
 _FACTOR_CHOLESKY = 2
-_SMALLEST_PIVOT = 1e-11  # of the largest: no softer sound model than 1e-9 was met
-_ICNTL_ERROR_ANALYSIS, _ICNTL_MEMORY, _ICNTL_REDUCED = 11, 14, 26
+_SMALLEST_PIVOT = 1e-11
+_ICNTL_MEMORY, _ICNTL_REDUCED = 14, 26
+WORKSPACE = (40, 200, 1000)
+"""Per cent added to MUMPS' estimate of its workspace, one after the other until it is enough."""
+TOO_SMALL = (-8, -9, -11, -14, -15, -17, -20)
+"""INFOG(1) that more workspace may cure."""
 
 
 def library() -> ctypes.CDLL | None:
@@ -64,44 +69,48 @@ class SchurFactor:
                 "use the column method (method='columns')"
             )
         self._lib = lib
+        self._factor = ctypes.c_void_p()
         self._comm = matrix.getComm().tompi4py()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, True)
         _, end = matrix.getOwnershipRange()
         mine = np.arange(end - n_last, end) if self._comm.rank == 0 else np.zeros(0)
         rows = PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
-        self._factor = ctypes.c_void_p()
+        for extra in WORKSPACE:
+            self._factorise(matrix, rows, extra)
+            if self._infog(1) not in TOO_SMALL:
+                break
+        rows.destroy()
+        problem = factor_problem(self._infog, self._rinfog)
+        if problem:
+            self.destroy()
+            raise SolverError(problem)
+        self.schur = self._fetch(n_last)
+
+    def _factorise(self, matrix: PETSc.Mat, rows: PETSc.IS, extra: int) -> None:
+        self.destroy()
         self._call(
             "MatGetFactor", _handle(matrix), b"mumps", _FACTOR_CHOLESKY, ctypes.byref(self._factor)
         )
         self._call("MatFactorSetSchurIS", self._factor, _handle(rows))
-        self._call("MatMumpsSetIcntl", self._factor, _ICNTL_MEMORY, 40)
+        self._call("MatMumpsSetIcntl", self._factor, _ICNTL_MEMORY, extra)
         self._call("MatCholeskyFactorSymbolic", self._factor, _handle(matrix), None, None)
         self._call("MatCholeskyFactorNumeric", self._factor, _handle(matrix), None)
-        rows.destroy()
-        self._check()
-        self.schur = self._fetch(n_last)
 
     def _call(self, name: str, *arguments: Any) -> None:
         code = getattr(self._lib, name)(*arguments)
         if code:
             raise SolverError(f"PETSc's {name} returned error code {code}")
 
-    def _check(self) -> None:
+    def _infog(self, number: int) -> int:
         value = ctypes.c_int()
-        self._call("MatMumpsGetInfog", self._factor, 1, ctypes.byref(value))
-        if value.value < 0:
-            detail = ctypes.c_int()
-            self._call("MatMumpsGetInfog", self._factor, 2, ctypes.byref(detail))
-            self.destroy()
-            raise SolverError(mumps_message(value.value, detail.value))
-        self._call("MatMumpsGetInfog", self._factor, 12, ctypes.byref(value))
-        pivots = [ctypes.c_double(), ctypes.c_double()]
-        for number, pivot in zip((19, 21), pivots, strict=True):
-            self._call("MatMumpsGetRinfog", self._factor, number, ctypes.byref(pivot))
-        if is_singular(value.value, pivots[0].value, pivots[1].value):
-            self.destroy()
-            raise SolverError(mumps_message(-10, 0))
+        self._call("MatMumpsGetInfog", self._factor, number, ctypes.byref(value))
+        return value.value
+
+    def _rinfog(self, number: int) -> float:
+        value = ctypes.c_double()
+        self._call("MatMumpsGetRinfog", self._factor, number, ctypes.byref(value))
+        return value.value
 
     def _fetch(self, n_last: int) -> Array:
         dense, status = ctypes.c_void_p(), ctypes.c_int()
@@ -133,9 +142,7 @@ class SchurFactor:
 
     def memory_mb(self) -> float:
         """Memory MUMPS used on all ranks for the factorisation, MB."""
-        value = ctypes.c_int()
-        self._call("MatMumpsGetInfog", self._factor, 22, ctypes.byref(value))
-        return float(value.value)
+        return float(self._infog(22))
 
     def destroy(self) -> None:
         """Free the factor; collective."""
@@ -153,18 +160,23 @@ def mirror_lower(square: Array) -> None:
         square[i : i + step, i + step :] = square[i + step :, i : i + step].T
 
 
-def is_singular(n_negative: int, smallest: float, largest: float) -> bool:
-    """Whether the pivots of a stiffness matrix tell that something can move freely.
+def factor_problem(infog: Callable[[int], int], rinfog: Callable[[int], float]) -> str | None:
+    """Why a factor of a stiffness matrix must not be used, ``None`` if it may.
 
-    Round-off leaves a body held by nothing a last pivot of either sign, below 1e-10 of the largest
-    in the cases tried; sound models had more than 1e-9 up to slenderness 8000.
+    MUMPS finds no fault in a body held by nothing: round-off leaves it a last pivot of either
+    sign, below 1e-10 of the largest in the cases tried. Sound models had more than 1e-9, up to
+    slenderness 8000.
 
     Args:
-        n_negative: Number of negative pivots.
-        smallest: Smallest pivot.
-        largest: Largest pivot; 0 where MUMPS does not tell.
+        infog: MUMPS' INFOG by number.
+        rinfog: MUMPS' RINFOG by number.
     """
-    return n_negative > 0 or smallest < _SMALLEST_PIVOT * largest
+    if infog(1) < 0:
+        return mumps_message(infog(1), infog(2))
+    n_negative, smallest, largest = infog(12), rinfog(19), rinfog(21)  # pivots; 0 if not told
+    if n_negative > 0 or smallest < _SMALLEST_PIVOT * largest:
+        return mumps_message(-10, 0)
+    return None
 
 
 def mumps_message(code: int, detail: int) -> str:

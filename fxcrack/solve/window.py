@@ -93,7 +93,7 @@ def choose_roles(
         reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
         cost: Cost model.
         around: Distances ahead of and behind the tips that the criterion looks at, per pair.
-        keep: (pair, slave node) of bonds that soften and must stay in the window.
+        keep: (pair, slave node) of bonds that are letting go and must stay in the window.
         cap_mb: Memory S may take, MB.
         gdim: Dimension.
 

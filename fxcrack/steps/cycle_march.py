@@ -6,7 +6,8 @@ way and G is a parabola in it,
 
     G(x) = 1/2 F(x) w(x)/A,      dG = max G - min G,
 
-so one dense equilibrium per corner of the cycle is enough. The number of cycles to the next release
+so one dense equilibrium per corner of the cycle is enough; where contact changes in between, the
+piece is halved until its middle lies on that parabola, to a tolerance. The number of cycles to the next release
 is then a closed form (:func:`fxcrack.criteria.cycle_jump`), over all interfaces together.
 """
 
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -24,6 +26,7 @@ from fxcrack.criteria import CycleJump, Fatigue, Paris, Regime, cycle_jump, tota
 from fxcrack.interface.front import Tips
 from fxcrack.output.history import History
 from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import RateEvaluator, repeat_tips
 from fxcrack.steps.fatigue import Cycles, FatigueState, TipCycle
 from fxcrack.steps.growth import Growth
@@ -31,11 +34,10 @@ from fxcrack.steps.march import March
 from fxcrack.steps.static import Static
 
 Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 _GRID = np.linspace(0.0, 1.0, 5)
-_HALVINGS = 6
-"""A piece of the cycle with changes of contact is cut into at most 2^this parts."""
+_HALVINGS = 8
+"""How often a piece of the cycle on which contact changes is halved at most."""
 
 
 class CycleMarch(March):
@@ -45,11 +47,12 @@ class CycleMarch(March):
         model: Model with its present state; prepared for the step.
         growths: Activated debonds, all with a :class:`Fatigue` criterion.
         step: Controls.
-        history: Where rows go: "cycle", the first stabilised cycle; "release" and "unstable"
-            after each release, with the cycle that follows; "arrest" or "limit".
+        history: Where rows go: "cycle" for the first stabilised cycle; "release", or "unstable"
+            beyond the upper limit, after each release with the cycle that follows; "arrest" or
+            "limit". They have the columns N, and G_max, dG and da/dN at the tip of largest f.
         loads_at: Amplitudes and load factors at a time, shape (n_loads,).
         breaks: Times at which an amplitude changes its slope.
-        state: What earlier cycles left behind; continued.
+        fatigue: What earlier cycles left behind; continued.
         **carried: As for :class:`March`.
     """
 
@@ -62,14 +65,14 @@ class CycleMarch(March):
         loads_at: Callable[[float], Array],
         breaks: tuple[float, ...],
         *,
-        state: FatigueState,
+        fatigue: FatigueState,
         **carried: Any,
     ) -> None:
         static = Static(until=step.until)
         super().__init__(model, growths, static, history, loads_at, breaks, **carried)
         self.cycles = step
-        self.fatigue = state
-        self._limit = state.N + step.n_max
+        self.fatigue = fatigue
+        self._limit = fatigue.N + step.n_max
         self._seen: list[TipCycle] = []
         names = [load if moves else answer for load, answer, moves in self._names]
         self._corners = step.corners(loads_at, breaks, names)
@@ -84,53 +87,266 @@ class CycleMarch(March):
             if reason:
                 return reason
             jump = self._jump()
-            self.fatigue.N = jump.cycles
-            if not jump.release.any():
+            if jump.event in ("arrest", "limit"):
                 self._record(jump.event)
-                return (
-                    f"{self.cycles.n_max:g} cycles done"
-                    if jump.event == "limit"
-                    else "arrest: no tip grows, however many cycles follow"
-                )
-            event = "release" if jump.event == "growth" else jump.event
+                if jump.event == "limit":
+                    return f"{self.cycles.n_max:g} cycles done"
+                return "arrest: no tip grows, however many cycles follow"
+            event = "unstable" if jump.event == "unstable" else "release"
             self._let_go_after(jump)
+
+    def _record(self, event: str) -> None:
+        super()._record(event)
+        row = self.history.rows[-1]
+        row["N"] = self.fatigue.N
+        for g, v, cycle in zip(self.growths, self._values, self._seen, strict=False):
+            if len(v.tips):
+                for name in ("G_max", "dG", "dadN"):
+                    row[f"{name}[{g.title}]"] = float(getattr(cycle, name)[v.largest])
 
     # -- one cycle -----------------------------------------------------------------------
 
     def _go_to_maximum(self) -> None:
         """Load to the maximum of the cycle; nothing grows on the way."""
+        corners = self._corners
         if self.cycles.period is not None:
             largest = []
-            for time, _ in self._corners:
-                self._follow(self._pieces(time), time)
-                self._values = self._evaluate()
+            for time, _ in corners:
+                self._load_to(time)
                 largest.append(max(self._largest()))
             top = int(np.argmax(largest))
-            self._corners = self._corners[top:] + self._corners[:top]
-        time = self._corners[0][0]
-        self._follow(self._pieces(time), time)
-        self._values = self._evaluate()
+            self._corners = corners[top:] + corners[:top]
+        self._load_to(self._corners[0][0])
         for g, v in zip(self.growths, self._values, strict=True):
             self.fatigue.meet(g.p, v.tips.node, g.front.surface.n_nodes)
 
-    def _stabilised_cycle(self) -> list[TipCycle]:
-        """Extremes of G at all tips, per interface; the state stays at the maximum."""
-        system = self.model.system
-        loads = [c[1] for c in self._corners]
-        if len(loads) > 2:
-            loads.append(loads[0])
-        saved = system.snapshot()
-        instants = [self._instant()]
-        extremes = _Extremes(self.growths, [v.tips for v in self._values])
-        for end in loads[1:]:
-            instants += self._way(instants[-1], end)
-        for a, b in zip(instants[:-1], instants[1:], strict=True):
-            if a.follows(b):
-                extremes.include(a, b)
-            else:
-                self._halve(extremes, a, b)
-        system.restore(saved)
-        return [c.cycle() for c in extremes.parts]
+    def _load_to(self, time: float) -> None:
+        self._follow(self._pieces(time), time)
+        self._values = self._evaluate()
 
-    def _instant(self) -> _Instant:
-        return _Instant()
+    def _stabilised_cycle(self) -> list[TipCycle]:
+        """What the cycle does at the tips of each interface; the state stays at the maximum."""
+        system = self.model.system
+        ends = [loads for _, loads in self._corners[1:]]
+        if len(ends) > 1:
+            ends.append(self._corners[0][1])
+        saved = system.snapshot()
+        corners = [self._instant(self.model.state)]
+        for loads in ends:
+            corners += self._way_to(corners[-1].state, loads)
+        largest = np.max([self._totals(c.measured) for c in corners], axis=0)
+        way = corners[:1]
+        for a, b in pairwise(corners):
+            way += self._between(a, b, largest, _HALVINGS)
+        system.restore(saved)
+        return self._extremes(way)
+
+    def _instant(self, state: Equilibrium, *, straight: bool = False) -> _Instant:
+        measured = [
+            g.evaluator.measure(v.tips, state, self.time) if len(v.tips) else np.zeros((0, 0))
+            for g, v in zip(self.growths, self._values, strict=True)
+        ]
+        return _Instant(state, measured, self.model.system.closed.tobytes(), straight)
+
+    def _way_to(self, start: Equilibrium, loads: Array) -> list[_Instant]:
+        """Instants from an equilibrium (left out) to other loads."""
+        system, force = self.model.system, self._force_at(self.time)
+        if system.soft.bonds:
+            # bonds an earlier step left half-way remember how they were loaded
+            path = system.pieces(start, loads, force)
+            return [self._instant(point, straight=True) for _, point in path]
+        return [self._instant(system.equilibrium(loads, force))]
+
+    def _between(self, a: _Instant, b: _Instant, largest: Array, halvings: int) -> list[_Instant]:
+        """Instants after a up to b between which G is a parabola, to the tolerance of the step."""
+        if b.follows(a):
+            return [b]
+        (middle,) = self._way_to(a.state, 0.5 * (a.state.loads + b.state.loads))
+        found = self._totals(middle.measured)
+        guess = self._totals([0.5 * (x + y) for x, y in zip(a.measured, b.measured, strict=True)])
+        if np.all(np.abs(found - guess) <= self.cycles.change * np.maximum(largest, found)):
+            return [middle, b]
+        if not halvings:
+            log.warn("contact changes too often in the cycle at N = %g to follow G", self.fatigue.N)
+            return [middle, b]
+        first = self._between(a, middle, largest, halvings - 1)
+        return first + self._between(middle, b, largest, halvings - 1)
+
+    def _totals(self, measured: list[Array]) -> Array:
+        """Total rate at the tips of all interfaces, shape (n_tips,), force/length."""
+        sums = [np.zeros(0)]
+        for g, v, values in zip(self.growths, self._values, measured, strict=True):
+            assert isinstance(g.evaluator, RateEvaluator)
+            if len(v.tips):
+                sums.append(total(g.evaluator.rates(v.tips, values)))
+        return np.concatenate(sums)
+
+    def _extremes(self, way: list[_Instant]) -> list[TipCycle]:
+        out = []
+        for i, (g, v) in enumerate(zip(self.growths, self._values, strict=True)):
+            evaluator, criterion = g.evaluator, g.criterion
+            assert isinstance(evaluator, RateEvaluator) and isinstance(criterion, Fatigue)
+            if not len(v.tips):
+                out.append(TipCycle(*np.zeros((4, 0))))
+                continue
+            rates = [
+                rates_between(evaluator, v.tips, a.measured[i], b.measured[i])
+                for a, b in pairwise(way)
+            ]
+            dG, top, critical = criterion.cycle(
+                np.concatenate(rates), evaluator.toughness[v.tips.node]
+            )
+            regime = criterion.paris.regime(top, critical)
+            growth = np.where(regime == Regime.PARIS, criterion.paris.growth_rate(dG), 0.0)
+            growth = np.where(regime == Regime.UNSTABLE, advance(v.tips), growth)
+            out.append(TipCycle(dG, top, critical, growth))
+        return out
+
+    # -- over the cycles to the next release ---------------------------------------------
+
+    def _jump(self) -> CycleJump:
+        """Jump over cycles like the present one, all interfaces together; notes what it does."""
+        fatigue, before = self.fatigue, self.fatigue.N
+        criteria = [g.criterion for g in self.growths if isinstance(g.criterion, Fatigue)]
+        tips = [v.tips for v in self._values]
+        counts = [len(t) for t in tips]
+        on = [(g.p, t.node) for g, t in zip(self.growths, tips, strict=True)]
+        keep = np.repeat([c.credit for c in criteria], counts)
+        credit = np.concatenate([fatigue.credit[p][nodes] for p, nodes in on])
+        jump = cycle_jump(
+            together([c.paris for c in criteria], counts),
+            np.concatenate([c.dG for c in self._seen]),
+            np.concatenate([c.G_max for c in self._seen]),
+            np.concatenate([c.G_c for c in self._seen]),
+            np.concatenate([advance(t) for t in tips]),
+            cycles=before,
+            initiated=np.concatenate([~fatigue.waiting[p][nodes] for p, nodes in on]),
+            credit=credit if keep.any() else None,
+            tolerance=min(c.tolerance for c in criteria),
+            limit=self._limit,
+        )
+        fatigue.N = jump.cycles
+        grown = np.where(keep, 0.0 if jump.credit is None else jump.credit, 0.0)
+        at = np.cumsum([0, *counts])
+        for i, (g, (p, nodes)) in enumerate(zip(self.growths, on, strict=True)):
+            part = slice(at[i], at[i + 1])
+            fatigue.waiting[p][nodes] = ~jump.initiated[part]
+            fatigue.credit[p][nodes] = grown[part]
+            fatigue.note(
+                before, g.title, nodes, _lengths(g, tips[i]), self._seen[i], jump.release[part]
+            )
+        return jump
+
+    def _let_go_after(self, jump: CycleJump) -> None:
+        """Let go at the maximum of the cycle."""
+        self._seen = []
+        counts = np.cumsum([len(v.tips) for v in self._values])
+        parts = np.split(jump.release, counts[:-1])
+        for g, v, chosen in zip(self.growths, self._values, parts, strict=True):
+            if chosen.any():
+                self._release(g, np.unique(v.tips.force_nodes[chosen]), v)
+        self._look()
+
+
+@dataclass(frozen=True)
+class _Instant:
+    """One instant of the cycle.
+
+    Attributes:
+        state: Equilibrium.
+        measured: What evaluators measured per interface, linear between equilibria.
+        contact: Which nodes are in contact.
+        straight: Contact and bonds did not change since the instant before.
+    """
+
+    state: Equilibrium
+    measured: list[Array]
+    contact: bytes
+    straight: bool
+
+    def follows(self, before: _Instant) -> bool:
+        """Whether everything is linear between an earlier instant and this one."""
+        return self.straight or self.contact == before.contact
+
+
+@dataclass(frozen=True)
+class _SideBySide(Paris):
+    """Laws of several interfaces for the tips of all of them, one interface after the other.
+
+    Attributes:
+        laws: One per interface.
+        counts: Number of tips of each.
+    """
+
+    laws: tuple[Paris, ...] = ()
+    counts: tuple[int, ...] = ()
+
+    def _each(self, name: str, *values: npt.ArrayLike) -> npt.NDArray[Any]:
+        parts = [np.split(np.asarray(v), np.cumsum(self.counts)[:-1]) for v in values]
+        each = zip(self.laws, *parts, strict=True)
+        return np.concatenate([getattr(law, name)(*part) for law, *part in each])
+
+    def onset_cycles(self, dG: npt.ArrayLike) -> Array:
+        """Cycles until growth starts."""
+        return self._each("onset_cycles", dG)
+
+    def growth_rate(self, dG: npt.ArrayLike) -> Array:
+        """Growth per cycle in the Paris regime."""
+        return self._each("growth_rate", dG)
+
+    def regime(self, G_max: npt.ArrayLike, G_c: npt.ArrayLike) -> npt.NDArray[np.int64]:
+        """Regime of each tip."""
+        return self._each("regime", G_max, G_c)
+
+
+def together(laws: Sequence[Paris], counts: Sequence[int]) -> Paris:
+    """One law for the tips of several interfaces, given one interface after the other.
+
+    Args:
+        laws: One per interface.
+        counts: Number of tips of each.
+    """
+    first = laws[0]
+    constants = (first.c1, first.c2, first.c3, first.c4, first.r1, first.r2)
+    return _SideBySide(*constants, laws=tuple(laws), counts=tuple(counts))
+
+
+def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> Array:
+    """Energy release rates on a linear piece of the cycle, the extremes of their sum among them.
+
+    The sum is a parabola wherever no mode is clipped at zero. It is taken at five points and at
+    the vertices of the parabolas around the smallest and the largest of these.
+
+    Args:
+        evaluator: The criterion on its interface.
+        tips: Front nodes.
+        a: What it measured at the beginning of the piece, shape (n, m).
+        b: The same at the end.
+
+    Returns:
+        Rates by mode, shape (7, n, 3), force/length.
+    """
+    n = len(tips)
+    many = np.concatenate([(1.0 - x) * a + x * b for x in _GRID])
+    rates = [evaluator.rates(repeat_tips(tips, len(_GRID)), many).reshape(len(_GRID), n, 3)]
+    sums = total(rates[0])
+    for place in (sums.argmin(axis=0), sums.argmax(axis=0)):
+        i = np.clip(place, 1, len(_GRID) - 2)
+        left, middle, right = (np.take_along_axis(sums, i[None] + k, 0)[0] for k in (-1, 0, 1))
+        bend = left - 2.0 * middle + right
+        shift = np.divide(0.5 * (left - right), bend, out=np.zeros(n), where=bend != 0.0)
+        x = np.clip(_GRID[i] + _GRID[1] * shift, 0.0, 1.0)[:, None]
+        rates.append(evaluator.rates(tips, (1.0 - x) * a + x * b)[None])
+    return np.concatenate(rates)
+
+
+def advance(tips: Tips) -> Array:
+    """Distance by which releasing each tip moves the front, shape (n,), length."""
+    return tips.area / tips.width
+
+
+def _lengths(growth: Growth, tips: Tips) -> list[float]:
+    """Crack length of each tip: its own on a line, the mean of the front on a surface."""
+    mean = growth.extent.length(tips)
+    own = dict(growth.extent.lengths()) if growth.front.surface.dim == 1 else {}
+    return [own.get(int(node), mean) for node in tips.node]

@@ -25,6 +25,9 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
+_SAME_TIME = 1e-9
+"""The curve begins, and f jumps up from 0, this fraction of the time before its first entry."""
+
 
 def mean_position(model: CondensedModel, where: str) -> Array:
     """Mean reference position of the nodes of a group, shape (3,), length; collective.
@@ -101,6 +104,9 @@ class LengthEvaluator:
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
         """F and l_3 of the tips, shape (n, 2)."""
         length, moves = self.lengths(tips)
+        begin = self.criterion.times[0]
+        if abs(time - begin) <= _SAME_TIME * abs(begin):
+            time = begin
         f = self.criterion.value(time, length, tips.d_behind)
         return np.stack([np.where(moves, f, 0.0), length], axis=1)
 

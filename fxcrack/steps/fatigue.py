@@ -39,8 +39,8 @@ class Cycles:
     ==================== =======================================================================
 
     G_max and G_min are the extremes of the total rate on this way, as they are for each tip. On a
-    piece without a change of contact they follow from its two ends; a piece with changes is
-    halved until they change by less than ``change``.
+    piece without a change of contact they follow from its two ends exactly; other pieces are
+    halved until G in their middle is known to ``change`` of G_max.
 
     Bonds let go at the maximum of the cycle (with ``period`` at its corner of largest f), where
     the step ends, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
@@ -52,7 +52,7 @@ class Cycles:
         period: First and last time of a turn through the amplitudes.
         n_max: Number of cycles after which the step ends.
         until: End condition, or several of which the first met ends the step.
-        change: Largest change of G_max and G_min, over G_max, by halving a piece of the cycle.
+        change: Largest change of G, over G_max, by which halving a piece of the cycle is refused.
     """
 
     maximum: float | None = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -43,11 +44,13 @@ class Debond:
         interface: Where.
         criterion: When.
         release: How the bond force goes to zero.
+        watch: Criteria whose quantities the history reports as well; they do not decide.
     """
 
     interface: Interface
     criterion: Criterion
     release: Release = field(default_factory=Step)
+    watch: Sequence[Criterion] = ()
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""
@@ -102,7 +105,9 @@ class Growth:
         self.front = model.fronts[p]
         self.extent = CrackExtent(self.front)
         self.evaluator: Evaluator = make_evaluator(model, p, debond.criterion)
-        model.around[p] = (self.evaluator.ahead, self.evaluator.behind)
+        self.watched = [make_evaluator(model, p, c) for c in debond.watch]
+        every = [self.evaluator, *self.watched]
+        model.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
         self.n_released = 0
         self.released: list[tuple[int, float]] = []
 
@@ -114,7 +119,8 @@ class Growth:
         """Whether the window holds all that evaluating these tips needs."""
         if not len(tips):
             return True
-        needed = [tips.force_nodes.ravel(), tips.wake_nodes.ravel(), self.evaluator.needs(tips)]
+        needed = [tips.force_nodes.ravel(), tips.wake_nodes.ravel()]
+        needed += [e.needs(tips) for e in (self.evaluator, *self.watched)]
         return self.model.holds(self.p, np.concatenate(needed))
 
     def evaluate(self, tips: Tips, state: Equilibrium, time: float) -> TipValues:
@@ -122,6 +128,8 @@ class Growth:
         if not len(tips):
             return TipValues(tips, np.zeros(0), {})
         f, report = self.evaluator.value(tips, self.evaluator.measure(tips, state, time))
+        for other in self.watched:
+            report = {**other.value(tips, other.measure(tips, state, time))[1], **report}
         return TipValues(tips, f, report)
 
     def crossing(

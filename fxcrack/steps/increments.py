@@ -40,6 +40,11 @@ class IncrementControl:
             self.size = min(self.size * self.step.growth, self.step.maximum)
         self.cutbacks = 0
 
+    def suggest(self, size: float) -> None:
+        """Take another size for the next increment; infinite for no suggestion."""
+        if size < float("inf"):
+            self.size = min(max(size, self.step.minimum), self.step.maximum)
+
     def rejected(self, used: float, why: str) -> None:
         """The increment ``used`` was too large.
 

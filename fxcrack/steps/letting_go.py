@@ -61,3 +61,19 @@ class TimedRelease:
         if not isinstance(self.law, AmplitudeRelease):
             return ()
         return tuple(self.start + t for t in self.law.times)
+
+    def now(self, time: float, increment: int) -> float:
+        """What drives it: the time or the number of the increment."""
+        return time if self.by_time else float(increment)
+
+
+def given_forces(
+    model: CondensedModel, ramps: list[TimedRelease], time: float, increment: int
+) -> Array:
+    """Forces that remain at a time and an increment, shape (n_window,)."""
+    force = np.zeros(model.system.n_window)
+    for ramp in ramps:
+        components = model.index[ramp.p][ramp.nodes]
+        inside = components >= 0
+        force[components[inside]] = ramp.fraction(ramp.now(time, increment)) * ramp.force[inside]
+    return force

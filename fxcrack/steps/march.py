@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack import log
-from fxcrack.criteria import Ramp, Step
+from fxcrack.criteria import AmplitudeRelease, Ramp, RateCriterion, Step
 from fxcrack.errors import InputError
 from fxcrack.interface.front import Tips
 from fxcrack.output.history import History, Row
@@ -25,7 +25,7 @@ from fxcrack.solve.jump_system import Equilibrium, blend, bond_work, work_betwee
 from fxcrack.steps.evaluate import TipValues
 from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
-from fxcrack.steps.letting_go import TimedRelease
+from fxcrack.steps.letting_go import TimedRelease, given_forces
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength, Releases, Time
 
@@ -47,6 +47,11 @@ class March:
         loads_at: Amplitudes and load factors at a time, shape (n_loads,).
         breaks: Times at which an amplitude changes its slope.
         time: Present time.
+        work: External work so far.
+        released: Energy that left through bonds so far.
+        snapped: The part of it lost where softening bonds ran through unstable states.
+        ramps: Bonds that are letting go with time or over increments; goes on in place.
+        increment: Number of increments so far.
         observer: Called with the event's name and the row after every event.
     """
 
@@ -63,6 +68,8 @@ class March:
         work: float = 0.0,
         released: float = 0.0,
         snapped: float = 0.0,
+        ramps: list[TimedRelease] | None = None,
+        increment: int = 0,
         observer: Observer | None = None,
     ) -> None:
         self.model = model
@@ -78,8 +85,8 @@ class March:
         self._names = self._column_names()
         self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=_LARGE)
         self._values: list[TipValues] = []
-        self._ramps: list[TimedRelease] = []
-        self._increment = 0
+        self._ramps: list[TimedRelease] = [] if ramps is None else ramps
+        self.increment = increment
         # all energy that left through bonds but the softening ones
         self._by_force = released - model.system.soft.taken(model.state.jump) - snapped
 
@@ -126,6 +133,8 @@ class March:
                 self._record("onset")
                 self._let_go()
                 continue
+            if self._curves_have_ended():
+                return "the curves of crack length against time have ended"
             if not self._load_to_event():
                 reason = self._ended()
                 return reason or "the criterion is not reached however large the load becomes"
@@ -136,6 +145,12 @@ class March:
                 "stepping='path' follows one proportional load; use the default amplitude for "
                 "all loads of the step"
             )
+        for g in self.growths:
+            if g.evaluator.breaks() or g.debond.release.driver == "time" or self._ramps:
+                raise InputError(
+                    f"interface '{g.title}' grows or lets go with time, which stepping='path' does "
+                    "not have: it moves the load forth and back; use 'event' or 'increment'"
+                )
         while True:
             reason = self._ended()
             if reason:
@@ -155,7 +170,7 @@ class March:
                 return reason
             target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
             states = self.model.system.snapshot()
-            self._increment += 1
+            self.increment += 1
             pieces = list(self._pieces(target))
             self._follow(pieces, target)
             values = self._evaluate()
@@ -164,7 +179,7 @@ class March:
                 for g, v in zip(self.growths, values, strict=True)
             ]
             if max(excess, default=-1.0) > 1e-12:
-                self._increment -= 1
+                self.increment -= 1
                 used = target - self._undo(states)
                 control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
@@ -173,13 +188,16 @@ class March:
             control.accepted()
             while self._any_ready() and not self._ended():
                 self._let_go(all_ready=True)
+                control.suggest(self._first_increment())
                 if not self._may_run_on():
                     break
 
     # -- moving along the load -----------------------------------------------------------
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
-        self._undo_state = (self.time, self.model.state, self.work, self.released)
+        self._undo_state = (
+            self.time, self.model.state, self.work, self.released, self._by_force
+        )  # fmt: skip
         return list(
             self.model.system.pieces(
                 self.model.state, self.loads_at(target), self._force_at(target)
@@ -191,8 +209,8 @@ class March:
             self._advance(self.model.state, point, target)
         self.time = target
 
-    def _undo(self, states: tuple[Any, Any, Any]) -> float:
-        self.time, self.model.state, self.work, self.released = self._undo_state
+    def _undo(self, states: Any) -> float:
+        self.time, self.model.state, self.work, self.released, self._by_force = self._undo_state
         self.model.system.restore(states)
         return self.time
 
@@ -203,14 +221,8 @@ class March:
         return [b for b in (*self.breaks, *own) if b > self.time + small]
 
     def _force_at(self, time: float) -> Array:
-        """Given forces of bonds that are letting go with time, shape (n_window,)."""
-        force = np.zeros(self.model.system.n_window)
-        for ramp in self._ramps:
-            components = self.model.index[ramp.p][ramp.nodes]
-            inside = components >= 0
-            now = time if ramp.by_time else float(self._increment)
-            force[components[inside]] = ramp.fraction(now) * ramp.force[inside]
-        return force
+        """Given forces of bonds that are letting go, shape (n_window,)."""
+        return given_forces(self.model, self._ramps, time, self.increment)
 
     def _load_to_event(self) -> bool:
         """Load until f = 1 somewhere, an amplitude bends or the end time comes.
@@ -233,10 +245,20 @@ class March:
 
     def _next_guess(self) -> float:
         """A time a little after the one at which f would reach 1 under a proportional load."""
-        f = max(self._largest())
-        if f > 0.0 and self.time > 0.0:
-            return float(self.time * min(1.02 / np.sqrt(min(f, 1.0)), 1e3))
+        largest = [
+            v.f.max(initial=0.0) ** (1.0 / g.evaluator.degree)
+            for g, v in zip(self.growths, self._values, strict=True)
+            if v.f.max(initial=0.0) > 0.0
+        ]
+        if largest and self.time > 0.0:
+            return float(self.time * min(1.02 / min(max(largest), 1.0), 1e3))
         return max(1.0, 2.0 * self.time)
+
+    def _curves_have_ended(self) -> bool:
+        """Whether growth follows curves of time alone, which end before the step does."""
+        ends = [getattr(g.evaluator, "ends", np.inf) for g in self.growths if len(g.tips())]
+        unlimited = self._end_time >= _LARGE and not self._breaks_ahead()
+        return unlimited and bool(ends) and max(ends) <= self.time
 
     def _unload_to_event(self) -> None:
         if not self._walk(0.0, upward=False):
@@ -331,9 +353,11 @@ class March:
         g.let_go(nodes, self.time)
         law = g.debond.release
         if not g.opening_driven and not isinstance(law, Step):
-            now = self.time if law.driver == "time" else float(self._increment)
+            now = self.time if law.driver == "time" else float(self.increment)
             ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)
-            self._ramps.append(ramp)
+            left = [r for r in self._ramps if r.fraction(r.now(self.time, self.increment)) > 0.0]
+            self._ramps[:] = [*left, ramp]
+            self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
             self.model.open(g.p, nodes)
             return
         if g.opening_driven:
@@ -372,6 +396,14 @@ class March:
             for g, v in zip(self.growths, self._values, strict=True)
         )
 
+    def _first_increment(self) -> float:
+        """Increment suggested after nodes have just begun to let go, inf without a suggestion."""
+        laws = [r.law for r in self._ramps if r.by_time and r.start == self.time]
+        return min(
+            (x.suggested_increment for x in laws if isinstance(x, AmplitudeRelease)),
+            default=np.inf,
+        )
+
     def _upper(self, g: Growth) -> float:
         upper = 1.0 + g.criterion.tolerance
         if g.unstable_tolerance is not None and g.n_released:
@@ -379,11 +411,15 @@ class March:
         return upper
 
     def _may_run_on(self) -> bool:
-        """Whether more nodes may go at this load: within the unstable growth tolerance."""
+        """Whether more nodes may go at this load: within the unstable growth tolerance.
+
+        Criteria other than energy release rates let nodes go whose f has reached its window at the
+        very start of an increment.
+        """
         over = [
             (float(v.f.max(initial=0.0)), g.unstable_tolerance)
             for g, v in zip(self.growths, self._values, strict=True)
-            if v.f.max(initial=0.0) >= 1.0
+            if v.f.max(initial=0.0) >= 1.0 and isinstance(g.criterion, RateCriterion)
         ]
         return all(t is not None and f <= 1.0 + t for f, t in over)
 
