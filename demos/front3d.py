@@ -100,6 +100,7 @@ def main(out: Path, fine: bool = False) -> None:
         y="R[end_upper.y]",
         xlabel="half opening / mm",
         ylabel="load / N",
+        label="progressive release",
         reference=[
             ("corrected beam theory", 0.5 * BEAM.dcb_opening(a, load), load),
             ("step release", 0.5 * curves[0][1], curves[0][2]),

@@ -1,4 +1,4 @@
-"""Cycles on a scene: N(a) beside integrals and closed forms, contact in the cycle, steps in turn."""
+"""Cycles on a scene: N(a) beside integrals and closed forms, how a step ends, what is refused."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def curve(history: fx.History, name: str = "bond") -> tuple[np.ndarray, np.ndarr
     return column(rows, f"a[{name}]"), column(rows, "N")
 
 
-# --- N(a) -------------------------------------------------------------------------------------------
+# --- N(a) -----------------------------------------------------------------------------------------
 
 
 def test_cycles_add_up_to_the_sum_of_the_law():
@@ -106,14 +106,16 @@ def test_vcct_sums_the_rate_at_the_beginning_of_each_element():
     found = fatigue_dcb.run(0.1, 8, method="vcct")
     dG = (1.0 - fatigue_dcb.RATIO**2) * static(found.a)
     expected = static.onset() + np.cumsum(0.1 / fatigue_dcb.PARIS.growth_rate(dG))
-    # G by crack closure and by the stiffness differ by 2e-6 in the first element, N by 11 times that
+    # G by crack closure and by the stiffness differ by 2e-6 in the first element, N by 22e-6
     np.testing.assert_allclose(found.N[1:], expected[:-1], rtol=5e-5)
 
 
 def test_closed_form_is_that_of_the_reference():
-    # reference.md: dG = G_max, E11 as it is; three to four digits
-    at = fatigue_dcb.closed_form([31.0, 32.0, 33.0, 34.0, 35.0], ratio=0.0)
-    assert at == pytest.approx([1.545e3, 6.35e3, 2.25e4, 7.51e4, 2.41e5], rel=3e-3)
+    # reference.md: dG = G_max, E11 as it is, onset at 165; three to four digits
+    at = fatigue_dcb.closed_form([30.0, 31.0, 32.0, 33.0, 34.0, 35.0], ratio=0.0)
+    assert 165.0 + at[1:] - at[0] == pytest.approx(
+        [1.545e3, 6.35e3, 2.25e4, 7.51e4, 2.41e5], rel=3e-3
+    )
 
 
 @pytest.mark.verification
@@ -129,12 +131,12 @@ def test_pure_moments_give_a_straight_line(method):
     scene.close()
 
 
-# --- ends of a step ---------------------------------------------------------------------------------
+# --- ends of a step -------------------------------------------------------------------------------
 
 
 def test_onset_comes_first_and_cycles_may_be_divided_into_steps():
     scene = dcb(criterion=fatigue(credit=True))
-    whole = curve(scene.run(fx.Cycles(maximum=U, ratio=0.1, until=until(scene, 33.0))))
+    whole = curve(scene.run(fx.Cycles(maximum=U, ratio=0.1, until=until(scene, 36.0))))
     scene.close()
     scene = dcb(criterion=fatigue(credit=True))
     history = scene.run(fx.Cycles(maximum=U, ratio=0.1, n_max=500.0))
@@ -210,30 +212,48 @@ def test_equal_extremes_of_g_do_not_grow():
     scene.close()
 
 
-def test_a_crack_runs_out_of_its_interface_or_the_bodies_come_apart():
-    for held, reason in ((True, "no crack tip is left"), (False, "total separation")):
-        mesh = dcb_2d(length=40.0, height=1.5, dx=1.0, ny=2)
-        far = [fx.Displacement(f"far_{s}", x=0.0, y=0.0) for s in ("upper", "lower")]
-        scene = fx.Scene(
-            mesh,
-            materials=STEEL,
-            model=fx.PlaneStrain(),
-            supports=far if held else far[1:],
-            loads=[fx.PointForce("pin_top", (0.0, 1.0)), fx.PointForce("pin_bottom", (0.0, -1.0))],
-            debonds=[fx.Debond(bond(30.0), fatigue())],
-        )
-        history = scene.run(fx.Cycles(maximum=1.5, minimum=0.0))
-        assert history.reason.startswith(reason), history.reason
-        assert history.rows[-1]["N"] > 0.0
-        assert largest_imbalance(history) < 1e-9
-        scene.close()
+def test_a_crack_runs_out_of_its_interface():
+    # a strip between two rails: G = M u^2/h for any crack length
+    u, height = 2e-3, 1.5
+    modulus = 70e3 * 0.7 / (1.3 * 0.4)
+    scene = fx.Scene(
+        dcb_2d(length=20.0, height=height, dx=0.5, ny=4),
+        materials=STEEL,
+        model=fx.PlaneStrain(),
+        supports=[fx.Displacement("top", x=0.0, y=1.0), fx.Displacement("bottom", x=0.0, y=-1.0)],
+        debonds=[fx.Debond(bond(8.0), fatigue())],
+    )
+    history = scene.run(fx.Cycles(maximum=u, minimum=0.0))
+    assert history.reason == "no crack tip is left"
+    assert scene.fatigue.N > 0.0 and not scene.model.fronts[0].bonded.any()
+    inside = [r for r in history if r["event"] in GROWS and r["a[bond]"] < 15.0]
+    # exact but for the exponential decay towards both ends: 4 heights away
+    np.testing.assert_allclose(column(inside, "G_max[bond]"), modulus * u**2 / height, rtol=1e-3)
+    assert largest_imbalance(history) < 1e-9
+    scene.close()
 
 
-# --- the cycle itself -------------------------------------------------------------------------------
+def test_bodies_that_come_apart_end_the_step():
+    scene = fx.Scene(
+        dcb_2d(length=40.0, height=1.5, dx=1.0, ny=2),
+        materials=STEEL,
+        model=fx.PlaneStrain(),
+        supports=[fx.Displacement("far_lower", x=0.0, y=0.0)],
+        loads=[fx.PointForce("pin_top", (0.0, 1.0)), fx.PointForce("pin_bottom", (0.0, -1.0))],
+        debonds=[fx.Debond(bond(30.0), fatigue())],
+    )
+    history = scene.run(fx.Cycles(maximum=2.5, minimum=0.0))
+    assert history.reason.startswith("total separation")
+    assert np.isfinite(history.rows[-1]["N"]) and history.rows[-1]["a[bond]"] > 37.0
+    assert largest_imbalance(history) < 1e-9
+    scene.close()
+
+
+# --- the cycle itself -----------------------------------------------------------------------------
 
 
 def sampled(scene: fx.Scene, corners: list[np.ndarray], n: int = 101) -> tuple[float, float]:
-    """Extremes of G over equilibria sampled along the way of the loads, one solved after another."""
+    """Extremes of G over equilibria sampled along the way of the loads."""
     system, growth = scene.model.system, scene.growths[0]
     tips, saved, found = growth.tips(), scene.model.system.snapshot(), []
     for a, b in pairwise(corners):
@@ -272,7 +292,7 @@ def test_end_notched_flexure_with_contact_equals_its_sampled_cycle(ratio):
         assert row["G_max[bond]"] == pytest.approx(top, rel=5e-3)
         assert row["dG[bond]"] == pytest.approx(top - bottom, abs=5e-3 * top)
     # mode II, and no release: contact is back in the state of the maximum
-    assert row["GI[bond]"] < 1e-6 * row["GII[bond]"]
+    assert row["GI[bond]"] < 1e-4 * row["GII[bond]"]
     assert row["balance"] == pytest.approx(0.0, abs=1e-9 * row["external_work"])
     scene.close()
 
@@ -316,11 +336,11 @@ def test_loads_out_of_step_with_contact_equal_their_sampled_cycle(comm):
     scene.close()
 
 
-# --- several interfaces, steps in turn --------------------------------------------------------------
+# --- several interfaces, steps in turn ------------------------------------------------------------
 
 
 def stacked(comm: Any, debonds: list[tuple[float, Any]]) -> tuple[fx.Scene, list[fx.Interface]]:
-    """Two bench specimens of one scene, far from each other: initial length and criterion of each."""
+    """Two bench specimens far from each other, with initial length and criterion of each."""
 
     def make() -> Blocks:
         model, x = Blocks(), np.linspace(0.0, 60.0, 61)
@@ -396,7 +416,7 @@ def test_alike_interfaces_let_go_together():
 
 @pytest.mark.mpi
 def test_static_growth_cycles_and_static_growth_in_turn(comm):
-    scene, (one, two) = stacked(comm, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue())])
+    scene, (one, _) = stacked(comm, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue())])
     brittle, tired = scene.debonds
     scene.run(fx.Static(until=fx.CrackLength(one, 33.0)), grow=[brittle])
     before = scene.history.rows[-1]
@@ -416,8 +436,6 @@ def test_static_growth_cycles_and_static_growth_in_turn(comm):
 def test_cycles_beside_bonds_that_soften():
     # a progressive front half-way through its elements stays as it is while another one is cycled
     scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue())])
-    scene.close()
-    scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue())])
     scene.debonds[0] = fx.Debond(one, fx.VCCT(GIc=0.2), release=fx.Progressive())
     brittle, tired = scene.debonds
     scene.run(fx.Static(until=fx.CrackLength(one, 32.0)), grow=[brittle])
@@ -425,14 +443,14 @@ def test_cycles_beside_bonds_that_soften():
     assert scene.model.system.soft.bonds
     maximum = before["time"]
     history = scene.run(fx.Cycles(maximum=maximum, ratio=0.1, n_max=2000.0), grow=[tired])
-    rows = [r for r in history if r["event"] in GROWS]
+    rows = [r for r in history if "dG[bond1]" in r]
     dG, G_max = column(rows, "dG[bond1]"), column(rows, "G_max[bond1]")
     np.testing.assert_allclose(dG, 0.99 * G_max, rtol=1e-9)
     assert largest_imbalance(history) < 1e-9
     scene.close()
 
 
-# --- other models, several ranks --------------------------------------------------------------------
+# --- other models, several ranks ------------------------------------------------------------------
 
 
 @pytest.mark.mpi
@@ -511,7 +529,9 @@ def test_ranks_agree(comm):
         for where in (comm, MPI.COMM_SELF):
             scene = make(where)
             history = scene.run(fx.Cycles(**step))
-            found.append([(r["event"], r["N"], r["a[bond]"], r["dG[bond]"]) for r in history[1:]])
+            found.append(
+                [(r["event"], r["N"], r["a[bond]"], r["dG[bond]"]) for r in history.rows[1:]]
+            )
             scene.close()
         ours, alone = found
         assert len(ours) == len(alone) > 2
@@ -522,7 +542,7 @@ def test_ranks_agree(comm):
         )
 
 
-# --- messages ---------------------------------------------------------------------------------------
+# --- messages -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(

@@ -29,6 +29,8 @@ CELLS = [
     for cell in ("quadrilateral", "triangle", "hexahedron", "tetrahedron")
     for order in (1, 2)
 ]
+# each kind of facet once, so that runs on more ranks than cores stay short
+PARALLEL = [("triangle", 2, "tension"), ("hexahedron", 1, "shear"), ("tetrahedron", 1, "tension")]
 
 
 def mesh_of(comm: MPI.Intracomm, cell: str, order: int, n_slave: int, n_master: int) -> Mesh:
@@ -85,9 +87,14 @@ def tie(**options: object) -> fx.Interface:
     )
 
 
-@pytest.mark.mpi
-@pytest.mark.parametrize("load", ["tension", "shear"])
-@pytest.mark.parametrize(("cell", "order"), CELLS)
+@pytest.mark.parametrize(
+    ("cell", "order", "load"),
+    [
+        pytest.param(*case, load, marks=pytest.mark.mpi if (*case, load) in PARALLEL else ())
+        for case in CELLS
+        for load in ("tension", "shear")
+    ],
+)
 def test_divided_master_facets_pass(
     comm: MPI.Intracomm, cell: str, order: int, load: str
 ) -> None:
@@ -106,8 +113,9 @@ def test_other_roles_do_not_pass(
     assert expected / 1.5 < found < expected * 1.5
 
 
-@pytest.mark.mpi
-@pytest.mark.parametrize("cell", ["quadrilateral", "hexahedron"])
+@pytest.mark.parametrize(
+    "cell", ["quadrilateral", pytest.param("hexahedron", marks=pytest.mark.mpi)]
+)
 def test_compression_through_contact(comm: MPI.Intracomm, cell: str) -> None:
     """Pressed together without a bond: uniform pressure, free to slide, from divided facets."""
     mesh = mesh_of(comm, cell, 1, 8, 4)
@@ -139,7 +147,6 @@ def test_compression_through_contact(comm: MPI.Intracomm, cell: str) -> None:
     scene.close()
 
 
-@pytest.mark.mpi
 def test_pulled_apart_nothing_is_carried(comm: MPI.Intracomm) -> None:
     """The same blocks the other way: a gap opens and no force arises."""
     mesh = mesh_of(comm, "quadrilateral", 1, 6, 4)

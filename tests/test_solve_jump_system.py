@@ -1,0 +1,226 @@
+"""Equilibrium of the interface with contact: optimality of what it finds, energy along the way.
+
+The structures are random: a full stiffness K over (inner, window, support) unknowns and force
+patterns, condensed here by plain linear algebra. Conditions of optimality on K are sufficient for
+the (convex) contact problem, so checking them needs no second solver.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fxcrack.errors import ConvergenceError
+from fxcrack.solve.cholesky import NotPositiveDefinite
+from fxcrack.solve.jump_system import Equilibrium, JumpSystem, blend, bond_work, work_between
+
+Array = npt.NDArray[np.float64]
+
+N_INNER, N_SUPPORTS, N_FORCES = 6, 2, 2
+ROUND_OFF = 1e-9  # condition numbers up to 1e4
+
+
+@dataclass
+class Structure:
+    """K over (inner, window, supports), force patterns f on the first two."""
+
+    k: Array
+    f: Array
+    n_window: int
+
+    @classmethod
+    def random(cls, n_window: int, seed: int) -> Structure:
+        rng = np.random.default_rng(seed)
+        n = N_INNER + n_window + N_SUPPORTS
+        q, _ = np.linalg.qr(rng.standard_normal((n, n)))
+        k = (q * np.geomspace(1e-3, 1.0, n)) @ q.T
+        f = rng.standard_normal((n, N_FORCES))
+        f[N_INNER + n_window :] = 0.0
+        return cls(k, f, n_window)
+
+    def system(self) -> JumpSystem:
+        """S over (window, supports, force patterns, one monitor: the first inner unknown)."""
+        n = len(self.k)
+        monitor = np.zeros((n, 1))
+        monitor[0] = 1.0
+        borders = np.hstack([-self.f, monitor])
+        a = np.block([[self.k, borders], [borders.T, np.zeros((N_FORCES + 1, N_FORCES + 1))]])
+        i = slice(0, N_INNER)
+        r = slice(N_INNER, None)
+        s = a[r, r] - a[r, i] @ np.linalg.solve(a[i, i], a[i, r])
+        return JumpSystem(0.5 * (s + s.T), self.n_window, N_SUPPORTS + N_FORCES, N_FORCES)
+
+    def displacement(self, state: Equilibrium) -> Array:
+        """All unknowns: inner ones from their equilibrium."""
+        last = np.concatenate([state.jump, state.loads[:N_SUPPORTS]])
+        load = self.f @ state.loads[N_SUPPORTS:]
+        inner = np.linalg.solve(
+            self.k[:N_INNER, :N_INNER], load[:N_INNER] - self.k[:N_INNER, N_INNER:] @ last
+        )
+        return np.concatenate([inner, last])
+
+    def interface_forces(self, state: Equilibrium) -> Array:
+        """K u - f on the window."""
+        u = self.displacement(state)
+        residual = self.k @ u - self.f @ state.loads[N_SUPPORTS:]
+        assert residual[:N_INNER] == pytest.approx(np.zeros(N_INNER), abs=ROUND_OFF)
+        return residual[N_INNER : N_INNER + self.n_window]
+
+
+def assert_optimal(structure: Structure, system: JumpSystem, state: Equilibrium) -> None:
+    """Every row knows its force or its jump, and contact is complementary."""
+    p = structure.interface_forces(state)
+    assert system.forces(state, np.arange(system.n_window)) == pytest.approx(p, abs=ROUND_OFF)
+    contact, held = system.contact, ~system.free & ~system.contact
+    free = system.free & ~contact
+    assert np.all(state.jump[held] == 0.0)
+    assert p[free] == pytest.approx(state.force[free], abs=ROUND_OFF)
+    gap = (state.jump + system.gap)[contact]
+    pressure = (p - np.where(system.free, state.force, 0.0))[contact]
+    assert gap.min(initial=0.0) > -ROUND_OFF and pressure.min(initial=0.0) > -ROUND_OFF
+    assert np.abs(gap * pressure).max(initial=0.0) < ROUND_OFF
+    # conjugates: reactions; displacements of the force patterns; and the monitor
+    u = structure.displacement(state)
+    residual = structure.k @ u - structure.f @ state.loads[N_SUPPORTS:]
+    assert state.conjugate[:N_SUPPORTS] == pytest.approx(residual[-N_SUPPORTS:], abs=ROUND_OFF)
+    assert state.conjugate[N_SUPPORTS:] == pytest.approx(structure.f.T @ u, abs=100 * ROUND_OFF)
+    assert system.monitors(state) == pytest.approx(u[:1], abs=100 * ROUND_OFF)
+    assert system.strain_energy(state) == pytest.approx(
+        0.5 * u @ structure.k @ u, rel=ROUND_OFF, abs=ROUND_OFF
+    )
+
+
+def opened(structure: Structure, rng: np.random.Generator, n_contact: int) -> JumpSystem:
+    """A system with free components, some of which may touch over gaps, and held ones."""
+    system = structure.system()
+    free = rng.permutation(system.n_window)[: system.n_window - 2]
+    system.release(free)
+    touching = free[:n_contact]
+    system.contact[touching] = True
+    system.gap[touching] = rng.choice([0.0, 0.0, 0.3, 1.0], n_contact)
+    return system
+
+
+seeds = st.integers(0, 10**6)
+
+
+@settings(max_examples=60)
+@given(seeds)
+def test_contact_is_optimal(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    structure = Structure.random(12, seed)
+    system = opened(structure, rng, 8)
+    force = np.where(system.free & ~system.contact, rng.standard_normal(12), 0.0)
+    for _ in range(3):
+        state = system.equilibrium(rng.standard_normal(4), force)
+        assert_optimal(structure, system, state)
+
+
+@settings(max_examples=40)
+@given(seeds)
+def test_contact_by_enumeration(seed: int) -> None:
+    """All closed sets tried: exactly one is consistent, the one found."""
+    rng = np.random.default_rng(seed)
+    structure = Structure.random(7, seed)
+    system = opened(structure, rng, 4)
+    loads, none = rng.standard_normal(4), np.zeros(7)
+    state = system.equilibrium(loads, none)
+    touching = np.flatnonzero(system.contact)
+    s, consistent = system.schur, []
+    for closed in product([False, True], repeat=4):
+        jump = np.zeros(7)
+        shut = touching[list(closed)]
+        jump[shut] = -system.gap[shut]
+        open_ones = np.setdiff1d(np.flatnonzero(system.free | system.contact), shut)
+        g = s[:7, system.load_columns] @ loads + s[:7, shut] @ jump[shut]
+        jump[open_ones] = np.linalg.solve(s[np.ix_(open_ones, open_ones)], -g[open_ones])
+        pressure = s[:7, :7] @ jump + s[:7, system.load_columns] @ loads
+        gap = (jump + system.gap)[touching]
+        if gap.min() > -1e-12 and pressure[shut].min(initial=0.0) > -1e-12:
+            consistent.append(jump)
+    # a second one would differ by round-off only (a gap and a pressure that are both zero)
+    assert consistent
+    for jump in consistent:
+        assert state.jump == pytest.approx(jump, abs=ROUND_OFF)
+
+
+@settings(max_examples=60)
+@given(seeds)
+def test_work_along_pieces_is_the_energy_gained(seed: int) -> None:
+    """Every piece is linear between equilibria, so the trapezoidal rule is exact on it."""
+    rng = np.random.default_rng(seed)
+    structure = Structure.random(12, seed)
+    system = opened(structure, rng, 8)
+    none = np.zeros(12)
+    state = system.equilibrium(np.zeros(4), none)
+    start = system.strain_energy(state)
+    work, largest = 0.0, 0.0
+    for target in rng.standard_normal((3, 4)):
+        begin, last = state, -1.0
+        for fraction, point in system.pieces(state, target, none):
+            assert last <= fraction <= 1.0
+            assert point.loads == pytest.approx(blend(begin, Equilibrium(target, none, none, none),
+                                                      fraction).loads, abs=ROUND_OFF)  # fmt: skip
+            work += work_between(state, point, N_FORCES)
+            assert_optimal(structure, system, point)
+            energy = system.strain_energy(point)
+            largest = max(largest, energy)
+            assert work == pytest.approx(energy - start, abs=ROUND_OFF * max(largest, 1.0))
+            state, last = point, fraction
+        assert last == 1.0
+        assert np.array_equal(state.loads, target)
+        again = system.equilibrium(target, none)
+        assert state.jump == pytest.approx(again.jump, abs=ROUND_OFF)
+
+
+@settings(max_examples=40)
+@given(seeds)
+def test_energy_of_a_release(seed: int) -> None:
+    """Bond forces that go to zero at constant load: work = gain of strain energy + released."""
+    rng = np.random.default_rng(seed)
+    structure = Structure.random(12, seed)
+    system = opened(structure, rng, 6)
+    state = system.equilibrium(rng.standard_normal(4), np.zeros(12))
+    energy = system.strain_energy(state)
+    held = np.flatnonzero(~system.free & ~system.contact)
+    force = np.zeros(12)
+    force[held] = system.forces(state, held)
+    system.release(held)
+    system.contact[held[:1]] = rng.random() < 0.5
+    last = Equilibrium(state.loads, force, state.jump, state.conjugate)
+    work = released = 0.0
+    for _, point in system.pieces(last, state.loads, np.zeros(12)):
+        work += work_between(last, point, N_FORCES)
+        released += bond_work(last, point)
+        last = point
+    assert_optimal(structure, system, last)
+    gain = system.strain_energy(last) - energy
+    assert work - released == pytest.approx(gain, rel=1e-8, abs=1e-8 * max(1.0, energy))
+    assert released >= -ROUND_OFF
+
+
+# -- cycling ---------------------------------------------------------------------------------------
+
+# Primal-dual active sets 1 -> 2 -> ... -> 1 come back on these (found by a search over seeds).
+CYCLING: list[int] = []
+
+
+def three_by_three(seed: int) -> tuple[JumpSystem, Array]:
+    """Three contact components and loads that act on them alone."""
+    rng = np.random.default_rng(seed)
+    b = rng.standard_normal((3, 3))
+    block = b @ b.T + 0.05 * np.eye(3)
+    schur = np.zeros((4, 4))
+    schur[:3, :3] = block
+    schur[:3, 3] = schur[3, :3] = rng.standard_normal(3)
+    schur[3, 3] = 10.0
+    system = JumpSystem(schur, 3, 1, 0)
+    system.release(np.arange(3))
+    system.contact[:] = True
+    return system, np.ones(1)
