@@ -37,6 +37,7 @@ from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
 from fxcrack.output import plots
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.history import History
+from fxcrack.output.report import tip_table, write_releases, write_tip_table
 from fxcrack.scene import Debond, Scene
 from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.steps.fatigue import Cycles
@@ -97,5 +98,8 @@ __all__ = [
     "mesh_from_gmsh",
     "plots",
     "read_mesh",
+    "tip_table",
     "write_fields",
+    "write_releases",
+    "write_tip_table",
 ]

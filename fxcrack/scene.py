@@ -23,7 +23,7 @@ from fxcrack.solve.condensed import CondensedModel, CondensedOptions
 from fxcrack.steps.cycle_march import CycleMarch
 from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
 from fxcrack.steps.growth import Debond, Growth
-from fxcrack.steps.letting_go import TimedRelease, given_forces
+from fxcrack.steps.letting_go import Letting, given_forces
 from fxcrack.steps.march import March, Observer
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength
@@ -91,7 +91,8 @@ class Scene:
         self._work = 0.0
         self._released = 0.0
         self._snapped = 0.0
-        self._ramps: list[TimedRelease] = []
+        self._viscous = 0.0
+        self._ramps: list[Letting] = []
         self._increment = 0
         self.fatigue = FatigueState()
         self.history = History(mesh.comm)
@@ -168,6 +169,7 @@ class Scene:
                 work=self._work,
                 released=self._released,
                 snapped=self._snapped,
+                viscous=self._viscous,
                 ramps=self._ramps,
                 increment=self._increment,
                 observer=tell,

@@ -65,9 +65,7 @@ def specimen(
         materials=materials,
         model=model,
         supports=supports,
-        debonds=[
-            fx.Debond(interface or bond(a0, contact=contact), criterion or fx.VCCT(GIc=0.2))
-        ],
+        debonds=[fx.Debond(interface or bond(a0, contact=contact), criterion or fx.VCCT(GIc=0.2))],
         **scene,
     )
 
@@ -142,9 +140,7 @@ def assert_same(one: fx.History, other: fx.History, rtol: float, **atol: float) 
 def gathered(matrix: PETSc.Mat) -> sp.csr_matrix:
     """A PETSc matrix whole on every rank."""
     indptr, indices, data = matrix.getValuesCSR()
-    mine = sp.csr_matrix(
-        (data, indices, indptr), shape=(len(indptr) - 1, matrix.getSize()[1])
-    )
+    mine = sp.csr_matrix((data, indices, indptr), shape=(len(indptr) - 1, matrix.getSize()[1]))
     return sp.vstack(matrix.getComm().tompi4py().allgather(mine)).tocsr()
 
 

@@ -12,7 +12,6 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.demos import center_crack as demo
-from fxcrack.demos import two_cracks
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
 from fxcrack.meshes.center_crack import center_crack
@@ -22,6 +21,7 @@ from fxcrack.meshes.penny import penny
 Array = npt.NDArray[np.float64]
 
 STEEL = fx.Isotropic(E=200e3, nu=0.3)
+STEP = fx.Step()
 A = 1.0
 ROUND_OFF = 1e-9  # linear pieces, each solved to 1e-13 or so, some dozens one after another
 TENSION = [fx.Traction("top", (0.0, 1.0)), fx.Traction("bottom", (0.0, -1.0))]
@@ -41,7 +41,7 @@ def outside_two_cracks(x: Array) -> Array:
 def plate(
     criterion: Any,
     *,
-    release: Any = fx.Step(),
+    release: Any = STEP,
     watch: tuple[Any, ...] = (),
     bonded: Callable[[Array], Array] = beyond_crack,
     supports: list[fx.Displacement] = STRETCH,
@@ -63,7 +63,7 @@ def plate(
     )
 
 
-def beam(criterion: Any, release: Any = fx.Step(), *, solid: bool = False, **o: Any) -> fx.Scene:
+def beam(criterion: Any, release: Any = STEP, *, solid: bool = False, **o: Any) -> fx.Scene:
     """A double cantilever beam 4 wide, in plane strain or a solid that cannot get narrower."""
     mesh = (
         dcb_3d(length=30.0, width=4.0, dx=0.5, dy=2.0, ny=3, **o.pop("mesh", {}))
@@ -117,7 +117,9 @@ def test_centre_crack_starts_at_the_closed_form_load() -> None:
     coarse = np.array(demo.onset_errors(20))
     fine = np.array(demo.onset_errors(40))
     assert (np.abs(fine) < 0.02).all()  # asked for at 40 elements per half crack
-    assert (np.log2(coarse / fine) > 0.9).all()  # a field in 1/sqrt(r) on even elements: first order
+    assert (
+        np.log2(coarse / fine) > 0.9
+    ).all()  # a field in 1/sqrt(r) on even elements: first order
 
 
 @pytest.mark.verification
@@ -156,7 +158,7 @@ def test_penny_shaped_crack_starts_at_sneddons_load(quantity: str) -> None:
         criterion = fx.CrackOpening(value, distance=distance)
     bond = fx.Interface("upper_face", "lower_face", bonded=lambda x: x[0] >= a - 1e-9)
     scene = fx.Scene(
-        penny(a=a, radius=40.0, half_height=40.0, dr=0.05, growth=1.25),
+        penny(a=a, radius=40.0, half_height=40.0, dr=0.05, growth=1.25, order=2),
         materials=STEEL,
         model=fx.Axisymmetric(),
         supports=[
@@ -170,17 +172,18 @@ def test_penny_shaped_crack_starts_at_sneddons_load(quantity: str) -> None:
         ],
         debonds=[fx.Debond(bond, criterion)],
     )
-    # 8 elements over the distance, as 40 per half of the plane crack
+    # 8 elements over the distance, as 40 per half of the plane crack; first order leaves 4 % in the
+    # stress, which is the difference of a singular field and the pressure
     assert onset(scene) == pytest.approx(1.0, rel=0.02)
 
 
-# --- the criteria beside each other -----------------------------------------------------------------
+# --- the criteria beside each other ---------------------------------------------------------------
 
 
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 def test_circle_of_three_criteria(order: int) -> None:
-    scenes, table = demo.run(n_crack=10, releases=5, order=order, width=10.0)
+    scenes, table = demo.run(n_crack=10, releases=5, order=order)
     for scene in scenes:
         assert_balanced(scene.history)
         assert scene.history.reason == f"{10 * order} nodes released"
@@ -193,12 +196,13 @@ def test_circle_of_three_criteria(order: int) -> None:
         assert stress[[0, -1]] == pytest.approx(RANKS, rel=1e-9)
 
 
-RANKS = (0.0, 0.0)
+RANKS = (261.560777198, 281.538426262)
+"""Pressures at the first and the fifth release, on one rank."""
 
 
 @pytest.mark.parametrize(
     "criterion",
-    [fx.CriticalStress(30.0, distance=0.75), fx.CrackOpening(0.01, distance=1.2)],
+    [fx.CriticalStress(30.0, distance=0.3), fx.CrackOpening(0.01, distance=1.2)],
     ids=["stress", "opening"],
 )
 @pytest.mark.parametrize("order", [1, 2])
@@ -249,14 +253,16 @@ def test_watched_criteria_are_reported_and_decide_nothing() -> None:
     )  # fmt: skip
     for scene in (alone, watched):
         run(scene, fx.Releases(4))
-    assert release_times(alone) == release_times(watched)
+    times = [np.array(list(release_times(s).values())) for s in (alone, watched)]
+    assert times[1] == pytest.approx(times[0], rel=ROUND_OFF)  # the windows differ
     assert set(watched.history.columns) - set(alone.history.columns) == {"cod[bond]", "grown[bond]"}
     row = watched.history.at("released[bond]", 2)
     assert row["grown[bond]"] == pytest.approx(0.1)
-    assert row["s11[bond]"] == alone.history.at("released[bond]", 2)["s11[bond]"]
+    same = alone.history.at("released[bond]", 2)["s11[bond]"]  # not that of the watched criterion
+    assert row["s11[bond]"] == pytest.approx(same, rel=ROUND_OFF)
 
 
-# --- crack length against time ------------------------------------------------------------------------
+# --- crack length against time --------------------------------------------------------------------
 
 CURVES = {
     "straight": ((0.0, 1.0), (0.5, 2.5)),
@@ -310,7 +316,9 @@ def test_front_of_a_solid_follows_the_curve() -> None:
         wanted = criterion.time_of(length)
         # nodes that a faster neighbour has left behind have their distance behind along the front's
         # normal, which f is scaled with; at f = 1 the scale is gone
-        assert times.get(int(node), 2.0) == pytest.approx(wanted if wanted < 0.99 else 2.0, rel=1e-6)
+        assert times.get(int(node), 2.0) == pytest.approx(
+            wanted if wanted < 0.99 else 2.0, rel=1e-6
+        )
 
 
 def test_curve_that_ends_ends_the_growth() -> None:

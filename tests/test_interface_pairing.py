@@ -130,8 +130,6 @@ def test_chain_is_composed(comm: MPI.Intracomm) -> None:
     assert np.linalg.matrix_rank(t) == len(t) == t.shape[1]
 
 
-
-
 @pytest.mark.mpi
 def test_bonded_node_outside_the_master(comm: MPI.Intracomm) -> None:
     mesh = three_blocks(comm)
@@ -238,7 +236,9 @@ def test_frames_turn_to_supports_along_the_interface() -> None:
         for axis in held:
             rows = 3 * pair.surface.dofs[at_end] + "xyz".index(axis)
             inner = t[:, : found.first + found.n_window]  # one rank: supports come last
-            assert inner[rows] == pytest.approx(np.zeros((len(rows), inner.shape[1])), abs=ROUND_OFF)
+            assert inner[rows] == pytest.approx(
+                np.zeros((len(rows), inner.shape[1])), abs=ROUND_OFF
+            )
 
 
 # -- interfaces ------------------------------------------------------------------------------------
@@ -330,9 +330,7 @@ def test_one_name_for_two_interfaces() -> None:
     ],
     ids=["value", "amplitude"],
 )
-def test_supports_that_contradict_each_other(
-    comm: MPI.Intracomm, second: fx.Displacement
-) -> None:
+def test_supports_that_contradict_each_other(comm: MPI.Intracomm, second: fx.Displacement) -> None:
     continuum = Continuum(small(comm), STEEL, fx.PlaneStrain())
     first = fx.Displacement("top", x=1.0)
     refused(
@@ -353,9 +351,7 @@ def test_supports_that_contradict_each_other(
         (fx.Displacement("tip", x=0.0), "has no group 'tip'; it has: .*top"),
     ],
 )
-def test_impossible_supports(
-    comm: MPI.Intracomm, support: fx.Displacement, message: str
-) -> None:
+def test_impossible_supports(comm: MPI.Intracomm, support: fx.Displacement, message: str) -> None:
     continuum = Continuum(small(comm), STEEL, fx.PlaneStrain())
     refused(comm, message, lambda: collect_supports(continuum, [support]), InputError)
 

@@ -95,9 +95,7 @@ def tie(**options: object) -> fx.Interface:
         for load in ("tension", "shear")
     ],
 )
-def test_divided_master_facets_pass(
-    comm: MPI.Intracomm, cell: str, order: int, load: str
-) -> None:
+def test_divided_master_facets_pass(comm: MPI.Intracomm, cell: str, order: int, load: str) -> None:
     # divided boxes make divided facets, save for linear triangles, whose diagonals differ
     n_slave = 4 if (cell, order) == ("tetrahedron", 1) else 8
     assert error(mesh_of(comm, cell, order, n_slave, 4), load, tie()) < ROUND_OFF

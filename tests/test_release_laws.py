@@ -154,6 +154,89 @@ def test_ramp_over_increments_needs_increments():
     assert abs(final["balance"]) < 1e-9 * final["external_work"]  # piecewise linear throughout
 
 
+def test_viscosity_spends_energy_and_fades_with_small_increments():
+    spent = {}
+    for viscosity in (0.0, 1e-3, 1e-2):
+        scene, bond = beam(fx.Step(), fx.VCCT(GIc=TOUGHNESS, viscosity=viscosity))
+        step = fx.Static(
+            until=fx.CrackLength(bond, 34.0),
+            stepping="increment",
+            initial=0.01,
+            maximum=0.01,
+            max_cutbacks=20,
+        )
+        history = scene.run(step)
+        last = history.rows[-1]
+        # all is linear between increments: the balance closes to round-off
+        assert abs(last["balance"]) < 1e-9 * last["external_work"]
+        spent[viscosity] = last.get("viscous_energy", 0.0)
+        scene.close()
+    assert spent[0.0] == 0.0
+    assert 0.0 < spent[1e-3]
+
+
+def test_viscosity_needs_increments():
+    scene, bond = beam(fx.Step(), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
+    with pytest.raises(fx.InputError, match="viscosity acts over increments"):
+        scene.run(fx.Static(until=fx.CrackLength(bond, 34.0)))
+
+
+def test_linear_scaling_heads_for_the_first_release():
+    counts = {}
+    for beta in (None, 0.9):
+        scene, _ = beam(fx.Step())
+        step = fx.Static(
+            until=fx.Releases(1),
+            stepping="increment",
+            initial=0.01,
+            maximum=10.0,
+            growth=1.0,
+            linear_scaling=beta,
+        )
+        history = scene.run(step)
+        counts[beta] = sum(row["event"] == "increment" for row in history)
+        scene.close()
+    # 0.01 to 0.94 in steps of 0.01 against one step to 90 % of the load and a few more
+    assert counts[0.9] < counts[None] / 4
+
+
+def test_records_of_released_bonds_carry_the_usual_names(tmp_path):
+    scene, _ = beam(fx.Step())
+    scene.run(fx.Static(until=fx.Releases(3)))
+    records = scene.growths[0].records
+    assert [r.node for r in records] == sorted(r.node for r in records)
+    for record in records:
+        # event stepping releases at f = 1 to round-off
+        assert record.EFENRRTR == pytest.approx(1.0, abs=1e-9)
+        assert record.ENRRT[0] == pytest.approx(TOUGHNESS, rel=1e-9)
+        # G = F w/(2 b d) on an even mesh
+        assert 0.5 * record.CRSTS[0] * record.OPENBC[0] == pytest.approx(TOUGHNESS, rel=1e-9)
+    fx.write_releases(scene, tmp_path / "releases.csv")
+    assert (tmp_path / "releases.csv").read_text().startswith("interface,node,x,y,z,DBT,EFENRRTR")
+    assert "VCCT, 3 nodes released" in fx.tip_table(scene)
+
+
+def test_toughness_follows_the_temperature():
+    hot = fx.Tabulated((0.0, 100.0), (0.2, 0.1))
+    loads = []
+    for temperature in (0.0, 100.0):
+        scene, _ = beam(fx.Step())
+        debond = fx.Debond(scene.debonds[0].interface, fx.VCCT(GIc=hot), temperature=temperature)
+        other = fx.Scene(
+            scene.mesh,
+            materials=fx.Isotropic(70e3, 0.3),
+            model=fx.PlaneStrain(),
+            supports=[
+                fx.Displacement("pin_top", x=0.0, y=1.0),
+                fx.Displacement("pin_bottom", x=0.0, y=-1.0),
+            ],
+            debonds=[debond],
+        )
+        history = other.run(fx.Static(until=fx.Releases(1)))
+        loads.append(onsets(history)[0]["R[pin_top.y]"])
+    assert loads[0] / loads[1] == pytest.approx(np.sqrt(2.0), rel=1e-9)  # G goes with load squared
+
+
 @pytest.mark.slow
 def test_front_in_3d_keeps_its_energy_only_with_progressive_release():
     step, found = front3d.run(fx.Step(), until=50.0)

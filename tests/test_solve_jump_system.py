@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 
 from fxcrack.errors import ConvergenceError
 from fxcrack.solve.cholesky import NotPositiveDefinite
-from fxcrack.solve.jump_system import Equilibrium, JumpSystem, blend, bond_work, work_between
+from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work, work_between
 
 Array = npt.NDArray[np.float64]
 
@@ -165,8 +165,8 @@ def test_work_along_pieces_is_the_energy_gained(seed: int) -> None:
         begin, last = state, -1.0
         for fraction, point in system.pieces(state, target, none):
             assert last <= fraction <= 1.0
-            assert point.loads == pytest.approx(blend(begin, Equilibrium(target, none, none, none),
-                                                      fraction).loads, abs=ROUND_OFF)  # fmt: skip
+            way = (1.0 - fraction) * begin.loads + fraction * target
+            assert point.loads == pytest.approx(way, abs=ROUND_OFF)
             work += work_between(state, point, N_FORCES)
             assert_optimal(structure, system, point)
             energy = system.strain_energy(point)
@@ -207,20 +207,75 @@ def test_energy_of_a_release(seed: int) -> None:
 
 # -- cycling ---------------------------------------------------------------------------------------
 
-# Primal-dual active sets 1 -> 2 -> ... -> 1 come back on these (found by a search over seeds).
-CYCLING: list[int] = []
 
+def cycling() -> JumpSystem:
+    """Three contacts on which the primal-dual active set cycles (Curtis, Han and Robinson 2015).
 
-def three_by_three(seed: int) -> tuple[JumpSystem, Array]:
-    """Three contact components and loads that act on them alone."""
-    rng = np.random.default_rng(seed)
-    b = rng.standard_normal((3, 3))
-    block = b @ b.T + 0.05 * np.eye(3)
+    Pressed by one load, only the first one opens, by 0.5.
+    """
     schur = np.zeros((4, 4))
-    schur[:3, :3] = block
-    schur[:3, 3] = schur[3, :3] = rng.standard_normal(3)
+    schur[:3, :3] = [[4.0, 5.0, -5.0], [5.0, 9.0, -5.0], [-5.0, -5.0, 7.0]]
+    schur[:3, 3] = schur[3, :3] = [-2.0, -1.0, 3.0]
     schur[3, 3] = 10.0
     system = JumpSystem(schur, 3, 1, 0)
     system.release(np.arange(3))
     system.contact[:] = True
-    return system, np.ones(1)
+    return system
+
+
+def test_cycling_ends(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From every set of closed nodes the solution is found, from most by the second method."""
+    calls = []
+    plain = JumpSystem._least_squares
+    monkeypatch.setattr(JumpSystem, "_least_squares", lambda *a: calls.append(1) or plain(*a))
+    for closed in product([False, True], repeat=3):
+        system = cycling()
+        system._set_closed(np.array(closed))
+        state = system.equilibrium(np.ones(1), np.zeros(3))
+        assert state.jump == pytest.approx([0.5, 0.0, 0.0], abs=ROUND_OFF)
+        assert np.array_equal(system.closed, [False, True, True])
+    assert 4 <= len(calls) <= 8
+
+
+def test_cycling_on_the_way() -> None:
+    """All change at once at the first moment: the way to the end is still one linear piece."""
+    system = cycling()
+    none = np.zeros(3)
+    start = system.equilibrium(np.zeros(1), none)
+    ((fraction, end),) = system.pieces(start, np.ones(1), none)
+    assert fraction == 1.0
+    assert end.jump == pytest.approx([0.5, 0.0, 0.0], abs=ROUND_OFF)
+    assert work_between(start, end, 0) == pytest.approx(system.strain_energy(end), rel=ROUND_OFF)
+
+
+def test_no_solution_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    system = cycling()
+    monkeypatch.setattr(system, "_least_squares", lambda *_: np.zeros(3, dtype=bool))
+    with pytest.raises(ConvergenceError, match="nodes keep changing between open and closed"):
+        system.equilibrium(np.ones(1), np.zeros(3))
+
+
+@settings(max_examples=30)
+@given(seeds)
+def test_least_squares_finds_the_same_set(seed: int) -> None:
+    """The method with guaranteed termination agrees with the active set."""
+    rng = np.random.default_rng(seed)
+    structure = Structure.random(20, seed)
+    system = opened(structure, rng, 14)
+    loads, none = rng.standard_normal(4), np.zeros(20)
+    system.equilibrium(loads, none)
+    expected = system.closed.copy()
+    assert np.array_equal(system._least_squares(loads, none), expected)
+
+
+def test_unrestrained_component() -> None:
+    """Releasing the last bond of a body raises, and the system goes on as before."""
+    schur = np.array([[1.0, -1.0, 0.5], [-1.0, 1.0, -0.5], [0.5, -0.5, 1.0]])
+    system = JumpSystem(schur, 2, 1, 0)
+    system.release(np.array([0]))
+    before = system.equilibrium(np.ones(1), np.zeros(2))
+    with pytest.raises(NotPositiveDefinite):
+        system.release(np.array([1]))
+    assert np.array_equal(system.free, [True, False])
+    after = system.equilibrium(np.ones(1), np.zeros(2))
+    assert np.array_equal(after.jump, before.jump) and after.jump[0] == -0.5

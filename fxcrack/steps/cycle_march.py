@@ -7,14 +7,14 @@ way and G is a parabola in it,
     G(x) = 1/2 F(x) w(x)/A,      dG = max G - min G,
 
 so one dense equilibrium per corner of the cycle is enough; where contact changes in between, the
-piece is halved until its middle lies on that parabola, to a tolerance. The number of cycles to the next release
-is then a closed form (:func:`fxcrack.criteria.cycle_jump`), over all interfaces together.
+piece is halved until its middle lies on that parabola, to a tolerance. The number of cycles to the
+next release is then a closed form (:func:`fxcrack.criteria.cycle_jump`), over all interfaces.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Any
 
@@ -27,13 +27,14 @@ from fxcrack.interface.front import Tips
 from fxcrack.output.history import History
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
-from fxcrack.steps.evaluate import RateEvaluator, repeat_tips
+from fxcrack.steps.evaluate import RateEvaluator, TipValues, repeat_tips
 from fxcrack.steps.fatigue import Cycles, FatigueState, TipCycle
 from fxcrack.steps.growth import Growth
 from fxcrack.steps.march import March
 from fxcrack.steps.static import Static
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 _GRID = np.linspace(0.0, 1.0, 5)
 _HALVINGS = 8
@@ -134,7 +135,7 @@ class CycleMarch(March):
         corners = [self._instant(self.model.state)]
         for loads in ends:
             corners += self._way_to(corners[-1].state, loads)
-        largest = np.max([self._totals(c.measured) for c in corners], axis=0)
+        largest: Array = np.stack([self._totals(c.measured) for c in corners]).max(axis=0)
         way = corners[:1]
         for a, b in pairwise(corners):
             way += self._between(a, b, largest, _HALVINGS)
@@ -246,6 +247,12 @@ class CycleMarch(March):
             if chosen.any():
                 self._release(g, np.unique(v.tips.force_nodes[chosen]), v)
         self._look()
+
+    def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:
+        super()._release(g, nodes, values)
+        # these bonds failed at a number of cycles
+        last = g.records[-len(nodes) :]
+        g.records[-len(nodes) :] = [replace(record, DBT=self.fatigue.N) for record in last]
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ reports. So the place where f reaches 1 on a linear piece is found without anoth
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -82,22 +83,32 @@ class RateEvaluator:
         model: Condensed model.
         p: Number of the pair.
         criterion: Criterion with toughness and mode mix.
+        temperature: Temperature of the interface, see :class:`Debond`.
     """
 
     degree = 2
     ahead = 0.0
     behind = 0.0
 
-    def __init__(self, model: CondensedModel, p: int, criterion: RateCriterion) -> None:
+    def __init__(
+        self,
+        model: CondensedModel,
+        p: int,
+        criterion: RateCriterion,
+        temperature: float | Callable[[Array], Array] | None = None,
+    ) -> None:
         self.model = model
         self.p = p
         self.criterion = criterion
         surface = model.fronts[p].surface
         criterion.check_slaves(surface.n_nodes)
+        x = surface.x[:, : model.continuum.gdim]
+        self._temperature: Array | None = None
+        if temperature is not None:
+            given = temperature(x) if callable(temperature) else temperature
+            self._temperature = np.broadcast_to(np.asarray(given, dtype=float), (len(x),))
         self.toughness = criterion.toughness_at(
-            surface.x[:, : model.continuum.gdim],
-            np.arange(surface.n_nodes),
-            n_slave=surface.n_nodes,
+            x, np.arange(len(x)), self._temperature, n_slave=len(x)
         )
 
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
@@ -140,6 +151,7 @@ class RateEvaluator:
             toughness = self.criterion.propagation_toughness_at(
                 surface.x[tips.node, : self.model.continuum.gdim],
                 tips.node,
+                None if self._temperature is None else self._temperature[tips.node],
                 n_slave=surface.n_nodes,
             )
         critical = self.criterion.critical(rates, toughness)

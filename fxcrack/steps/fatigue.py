@@ -38,9 +38,9 @@ class Cycles:
                          not in step with each other; they must return to where they began
     ==================== =======================================================================
 
-    G_max and G_min are the extremes of the total rate on this way, as they are for each tip. On a
+    G_max and G_min are the extremes of the total rate on this way, for each tip its own. On a
     piece without a change of contact they follow from its two ends exactly; other pieces are
-    halved until G in their middle is known to ``change`` of G_max.
+    halved until they are known to ``change`` of G_max.
 
     Bonds let go at the maximum of the cycle (with ``period`` at its corner of largest f), where
     the step ends, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
@@ -52,7 +52,8 @@ class Cycles:
         period: First and last time of a turn through the amplitudes.
         n_max: Number of cycles after which the step ends.
         until: End condition, or several of which the first met ends the step.
-        change: Largest change of G, over G_max, by which halving a piece of the cycle is refused.
+        change: How far G may lie from the parabola between two equilibria, over G_max, where
+            contact changes between them.
     """
 
     maximum: float | None = None

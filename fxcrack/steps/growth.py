@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -27,6 +27,7 @@ from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
 from fxcrack.steps.evaluate_distance import OpeningEvaluator, StressEvaluator
 from fxcrack.steps.evaluate_length import LengthEvaluator
+from fxcrack.steps.records import ReleaseRecord, release_records
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -44,6 +45,8 @@ class Debond:
         interface: Where.
         criterion: When.
         release: How the bond force goes to zero.
+        temperature: Temperature of the interface, a number or a function of positions of shape
+            (n, gdim), for toughness tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.
     """
 
@@ -51,6 +54,7 @@ class Debond:
     criterion: Criterion
     release: Release = field(default_factory=Step)
     watch: Sequence[Criterion] = ()
+    temperature: float | Callable[[Array], Array] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""
@@ -90,7 +94,8 @@ class Growth:
 
     Attributes:
         n_released: Nodes let go so far.
-        released: (node, time) of every release in order.
+        records: What is known of every release, in order.
+        initial_tips: Front nodes at the beginning.
     """
 
     def __init__(self, model: CondensedModel, p: int, debond: Debond) -> None:
@@ -104,12 +109,18 @@ class Growth:
         )
         self.front = model.fronts[p]
         self.extent = CrackExtent(self.front)
-        self.evaluator: Evaluator = make_evaluator(model, p, debond.criterion)
+        self.evaluator: Evaluator = make_evaluator(model, p, debond.criterion, debond.temperature)
         self.watched = [make_evaluator(model, p, c) for c in debond.watch]
         every = [self.evaluator, *self.watched]
         model.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
         self.n_released = 0
-        self.released: list[tuple[int, float]] = []
+        self.records: list[ReleaseRecord] = []
+        self.initial_tips = self.front.candidates()
+
+    @property
+    def released(self) -> list[tuple[int, float]]:
+        """(node, time) of every release in order."""
+        return [(r.node, r.DBT) for r in self.records]
 
     def tips(self) -> Tips:
         """Present front."""
@@ -165,13 +176,18 @@ class Growth:
         assert isinstance(evaluator, RateEvaluator)
         return evaluator.energy_to_spend(nodes, values, self.debond.release)
 
-    def let_go(self, nodes: Ints, time: float) -> None:
-        """Count nodes as released."""
+    def let_go(self, nodes: Ints, values: TipValues, state: Equilibrium, time: float) -> None:
+        """Note nodes that are about to be released."""
         self.n_released += len(nodes)
-        self.released += [(int(n), time) for n in nodes]
+        self.records += release_records(self, nodes, values, state, time)
 
 
-def make_evaluator(model: CondensedModel, p: int, criterion: Criterion) -> Evaluator:
+def make_evaluator(
+    model: CondensedModel,
+    p: int,
+    criterion: Criterion,
+    temperature: float | Callable[[Array], Array] | None = None,
+) -> Evaluator:
     """The evaluator that goes with a criterion; collective."""
     if isinstance(criterion, CriticalStress):
         return StressEvaluator(model, p, criterion)
@@ -179,4 +195,4 @@ def make_evaluator(model: CondensedModel, p: int, criterion: Criterion) -> Evalu
         return OpeningEvaluator(model, p, criterion)
     if isinstance(criterion, CrackLengthVsTime):
         return LengthEvaluator(model, p, criterion)
-    return RateEvaluator(model, p, criterion)
+    return RateEvaluator(model, p, criterion, temperature)

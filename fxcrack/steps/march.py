@@ -25,7 +25,13 @@ from fxcrack.solve.jump_system import Equilibrium, blend, bond_work, work_betwee
 from fxcrack.steps.evaluate import TipValues
 from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
-from fxcrack.steps.letting_go import TimedRelease, given_forces
+from fxcrack.steps.letting_go import (
+    Letting,
+    TimedRelease,
+    ViscousRelease,
+    bond_forces_of,
+    given_forces,
+)
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength, Releases, Time
 
@@ -68,7 +74,8 @@ class March:
         work: float = 0.0,
         released: float = 0.0,
         snapped: float = 0.0,
-        ramps: list[TimedRelease] | None = None,
+        viscous: float = 0.0,
+        ramps: list[Letting] | None = None,
         increment: int = 0,
         observer: Observer | None = None,
     ) -> None:
@@ -85,8 +92,9 @@ class March:
         self._names = self._column_names()
         self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=_LARGE)
         self._values: list[TipValues] = []
-        self._ramps: list[TimedRelease] = [] if ramps is None else ramps
+        self._ramps: list[Letting] = [] if ramps is None else ramps
         self.increment = increment
+        self.viscous = viscous
         # all energy that left through bonds but the softening ones
         self._by_force = released - model.system.soft.taken(model.state.jump) - snapped
 
@@ -101,6 +109,12 @@ class March:
                     f"interface '{g.title}' lets go over {law.increments} increments, which "
                     f"stepping='{self.step.stepping}' does not have; use stepping='increment', "
                     "or a ramp with the opening (no number of increments)"
+                )
+            if getattr(g.criterion, "viscosity", 0.0) > 0.0 and self.step.stepping != "increment":
+                raise InputError(
+                    f"interface '{g.title}': viscosity acts over increments of time, which "
+                    f"stepping='{self.step.stepping}' does not have; use stepping='increment' "
+                    "or viscosity=0"
                 )
         start = clock.perf_counter()
         before = {k: v for k, v in self.model.timings.seconds.items() if k.startswith("factor")}
@@ -168,6 +182,7 @@ class March:
             reason = self._ended()
             if reason:
                 return reason
+            control.size = max(control.size, min(self._scaled(), self.step.maximum))
             target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
             states = self.model.system.snapshot()
             self.increment += 1
@@ -184,6 +199,9 @@ class March:
                 control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
             self._values = values
+            for ramp in self._ramps:
+                if isinstance(ramp, ViscousRelease):
+                    ramp.accept(self.time)
             self._record("increment")
             control.accepted()
             while self._any_ready() and not self._ended():
@@ -192,11 +210,23 @@ class March:
                 if not self._may_run_on():
                     break
 
+    def _scaled(self) -> float:
+        """Increment that brings a proportional load near the first release, else 0."""
+        beta = self.step.linear_scaling
+        if beta is None or self.time <= 0.0 or any(g.n_released for g in self.growths):
+            return 0.0
+        reach = [
+            float(v.f.max()) ** (-1.0 / g.evaluator.degree)
+            for g, v in zip(self.growths, self._values, strict=True)
+            if v.f.max(initial=0.0) > 0.0
+        ]
+        return max(self.time * (beta * min(reach) - 1.0), 0.0) if reach else 0.0
+
     # -- moving along the load -----------------------------------------------------------
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
         self._undo_state = (
-            self.time, self.model.state, self.work, self.released, self._by_force
+            self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
         )  # fmt: skip
         return list(
             self.model.system.pieces(
@@ -210,7 +240,9 @@ class March:
         self.time = target
 
     def _undo(self, states: Any) -> float:
-        self.time, self.model.state, self.work, self.released, self._by_force = self._undo_state
+        (
+            self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
+        ) = self._undo_state  # fmt: skip
         self.model.system.restore(states)
         return self.time
 
@@ -327,7 +359,10 @@ class March:
         for ramp in self._ramps:
             index = self.model.components(ramp.p, ramp.nodes)
             force = here.force[index] + point.force[index]
-            self._by_force -= 0.5 * float(force @ (point.jump[index] - here.jump[index]))
+            spent = -0.5 * float(force @ (point.jump[index] - here.jump[index]))
+            self._by_force += spent
+            if isinstance(ramp, ViscousRelease):
+                self.viscous += spent
         self.model.state = point
         self.time = time
 
@@ -350,8 +385,15 @@ class March:
 
     def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:
         """Let nodes of one interface go, at once or with time."""
-        g.let_go(nodes, self.time)
+        g.let_go(nodes, values, self.model.state, self.time)
         law = g.debond.release
+        viscosity = getattr(g.criterion, "viscosity", 0.0)
+        if viscosity > 0.0 and not g.opening_driven and isinstance(law, Step):
+            force = bond_forces_of(self.model, g.p, nodes)
+            self._ramps.append(ViscousRelease(g.p, nodes, force, viscosity, self.time))
+            self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
+            self.model.open(g.p, nodes)
+            return
         if not g.opening_driven and not isinstance(law, Step):
             now = self.time if law.driver == "time" else float(self.increment)
             ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)
@@ -398,7 +440,8 @@ class March:
 
     def _first_increment(self) -> float:
         """Increment suggested after nodes have just begun to let go, inf without a suggestion."""
-        laws = [r.law for r in self._ramps if r.by_time and r.start == self.time]
+        timed = [r for r in self._ramps if isinstance(r, TimedRelease)]
+        laws = [r.law for r in timed if r.by_time and r.start == self.time]
         return min(
             (x.suggested_increment for x in laws if isinstance(x, AmplitudeRelease)),
             default=np.inf,
@@ -495,7 +538,9 @@ class March:
                 row[f"node[{g.title}]"] = int(v.tips.node[i])
         row["strain_energy"] = energy
         row["external_work"] = self.work
-        row["released_energy"] = self.released
+        row["released_energy"] = self.released - self.viscous
+        if self.viscous:
+            row["viscous_energy"] = self.viscous
         if model.system.soft.bonds or model.system.soft.finished:
             row["snap_energy"] = self.snapped
         row["balance"] = self.work - energy - self.released

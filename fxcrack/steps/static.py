@@ -24,6 +24,8 @@ class Static:
         growth: Factor on the increment after an accepted one.
         cutback: Factor on the increment after a rejected one.
         max_cutbacks: Cutbacks allowed in one increment.
+        linear_scaling: Factor beta (0.9 is usual) with which increments before the first release
+            head straight for it, assuming a proportional load; ``None`` does not.
     """
 
     until: Until | tuple[Until, ...]
@@ -34,6 +36,7 @@ class Static:
     growth: float = 1.5
     cutback: float = 0.5
     max_cutbacks: int = 5
+    linear_scaling: float | None = None
 
     def __post_init__(self) -> None:
         """Check the controls."""
@@ -46,6 +49,10 @@ class Static:
             )
         if not (self.growth >= 1.0 and 0.0 < self.cutback < 1.0 and self.max_cutbacks >= 0):
             raise InputError("growth must be >= 1, cutback between 0 and 1, max_cutbacks >= 0")
+        if self.linear_scaling is not None and not 0.0 < self.linear_scaling < 1.0:
+            raise InputError(
+                f"linear_scaling = {self.linear_scaling} must lie between 0 and 1; 0.9 is usual"
+            )
 
     @property
     def ends(self) -> tuple[Until, ...]:
