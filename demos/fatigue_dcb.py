@@ -12,7 +12,8 @@
 #
 # N goes with G^10.6: one per cent in G is eleven in N, and an element of length d counts with its G
 # at one end 43 d/(2 ae) too much or too little. `method="closure"`, the energy of releasing a node,
-# is the mean of G over the element instead: the sum over elements becomes a midpoint rule.
+# is the mean of G over the element instead (in 2-D, where one node is the whole front): the sum
+# over elements becomes a midpoint rule.
 #
 # A cycle costs two small dense equilibria, and one is solved per release: millions of cycles take a
 # second, on one factorisation.

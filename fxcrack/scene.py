@@ -92,7 +92,7 @@ class Scene:
         self._released = 0.0
         self._snapped = 0.0
         self._viscous = 0.0
-        self._ramps: list[Letting] = []
+        self.ramps: list[Letting] = []
         self._increment = 0
         self.fatigue = FatigueState()
         self.history = History(mesh.comm)
@@ -154,7 +154,7 @@ class Scene:
             self._started = True
         else:
             # another window: the same equilibrium in its components
-            self.model.solve(given_forces(self.model, self._ramps, self.time, self._increment))
+            self.model.solve(given_forces(self.model, self.ramps, self.time, self._increment))
         with Progress(self.mesh.comm, enabled=progress) as show:
             every: list[Observer] = [show, *observers]
 
@@ -170,7 +170,7 @@ class Scene:
                 released=self._released,
                 snapped=self._snapped,
                 viscous=self._viscous,
-                ramps=self._ramps,
+                ramps=self.ramps,
                 increment=self._increment,
                 observer=tell,
             )

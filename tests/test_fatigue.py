@@ -15,7 +15,7 @@ from fxcrack.meshes.dcb import dcb_2d
 
 LAW = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.2, r2=0.9)
 GROWS = ("cycle", "release", "unstable")
-U = 1.0  # opens the bench specimen's arms to G = 0.22 at a = 30
+U = 1.0  # of each arm; G = 0.26 at a = 30
 
 
 def fatigue(**options: Any) -> fx.Fatigue:
@@ -67,6 +67,8 @@ def test_cycles_add_up_to_the_sum_of_the_law():
     np.testing.assert_allclose(tips["N"], N[:-1], rtol=1e-12)
     np.testing.assert_allclose(tips["a"], a[:-1], rtol=1e-12)
     assert all(tips["released"]) and set(tips["interface"]) == {"bond"}
+    # and the cycle in which each bond failed
+    np.testing.assert_allclose([r.DBT for r in scene.growths[0].records], N[1:], rtol=1e-12)
     assert history.reason == "crack length 40 of 'bond' reached"
     assert history.details["factorizations"] == 1
     assert largest_imbalance(history) < 1e-9  # bonds let go at the maximum; all is linear
@@ -137,7 +139,7 @@ def test_onset_comes_first_and_cycles_may_be_divided_into_steps():
     history = scene.run(fx.Cycles(maximum=U, ratio=0.1, n_max=500.0))
     assert history.reason == "500 cycles done"
     assert [r["event"] for r in history] == ["start", "cycle", "limit", "end"]
-    assert scene.fatigue.waiting[0].any()  # N0 = 50/0.22^2 = 1e3
+    assert scene.fatigue.waiting[0].any()  # N0 = 50/0.256^2 = 763
     for _ in range(20):
         history = scene.run(fx.Cycles(maximum=U, ratio=0.1, n_max=250.0))
     assert history.rows[-1]["N"] == pytest.approx(500.0 + 20 * 250.0)
@@ -150,13 +152,18 @@ def test_onset_comes_first_and_cycles_may_be_divided_into_steps():
     scene.close()
 
 
-def test_without_credit_each_step_begins_its_element_anew():
-    scene = dcb()
-    for _ in range(3):
-        history = scene.run(fx.Cycles(maximum=U, ratio=0.0, n_max=1500.0))
-    # N0 = 1e3 is counted once; the growth of 1 mm takes 800 cycles, of which no step has done less
-    assert history.rows[-1]["released[bond]"] > 0
-    assert not np.any(scene.fatigue.credit[0])
+@pytest.mark.parametrize("credit", [False, True])
+def test_an_element_is_begun_anew_in_each_step_unless_growth_is_credited(credit):
+    scene = dcb(criterion=fatigue(credit=credit))
+    history = scene.run(fx.Cycles(maximum=U, ratio=0.0, n_max=800.0))
+    dG = history.rows[-1]["dG[bond]"]
+    onset, element = LAW.onset_cycles(dG), 1.0 / LAW.growth_rate(dG)
+    assert onset < 800.0 < onset + element
+    history = scene.run(fx.Cycles(maximum=U, ratio=0.0, n_max=800.0))
+    (first, *_) = [r for r in history if r["event"] == "release"]
+    expected = (onset if credit else 800.0) + element
+    assert first["N"] == pytest.approx(expected, rel=1e-9)
+    assert np.any(scene.fatigue.credit[0]) == credit
     scene.close()
 
 

@@ -1,4 +1,4 @@
-"""Cycles with contact, on several interfaces, in turn with static steps, in 3-D, on several ranks."""
+"""Cycles with contact, on several interfaces, in turn with static steps, in 3-D, on ranks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from fxcrack.meshes.penny import penny
 
 LAW = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.2, r2=0.9)
 GROWS = ("cycle", "release", "unstable")
-U = 1.0  # opens the bench specimen's arms to G = 0.22 at a = 30
+U = 1.0  # of each arm; G = 0.26 at a = 30
 
 
 def fatigue(**options: Any) -> fx.Fatigue:

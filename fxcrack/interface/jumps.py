@@ -424,7 +424,8 @@ def _interface_rows(
     slave_flat = is_slave.ravel()
     column, which, value = shared.ravel(), replica.which.ravel(), replica.value.ravel()
     base_rows = np.flatnonzero(~slave_flat & (column >= 0))
-    held_rows = np.flatnonzero(~slave_flat & (which >= 0))
+    # a supported component of a slave moves like its masters', but its reaction is its own
+    held_rows = np.flatnonzero(which >= 0)
     entries = [
         (base_rows, column[base_rows], np.ones(len(base_rows))),
         (held_rows, first + n_window + which[held_rows], value[held_rows]),
@@ -435,7 +436,8 @@ def _interface_rows(
         weights = pair.weights[k]
         for c in range(gdim):
             row = np.broadcast_to((gdim * s[k] + c)[:, None], masters.shape)
-            links.append((row.ravel(), (gdim * masters + c).ravel(), weights.ravel()))
+            follows = np.where(replica.which[s[k], c] < 0, 1.0, 0.0)[:, None] * weights
+            links.append((row.ravel(), (gdim * masters + c).ravel(), follows.ravel()))
         for j in range(gdim):
             inner = column[gdim * s[k] + j]
             target = np.where(number[k, j] >= 0, first + number[k, j], inner)

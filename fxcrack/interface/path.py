@@ -1,4 +1,4 @@
-"""Walking along a slave surface from a crack tip, over the bonded part ahead or the open one behind.
+"""Walking along a slave surface from a tip, over the bonded part ahead or the open part behind.
 
 On a line (2-D) the way is the line itself, whatever its shape. On a surface (3-D) it is the mesh
 line most nearly along the growth direction; each step counts with its component in that direction,
@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
-_ALIGNED = 0.3
+_ALIGNED = 0.1
 """Least cosine between a step and the direction of the way on a surface (3-D)."""
 
 

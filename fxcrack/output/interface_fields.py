@@ -21,6 +21,7 @@ from dolfinx import fem
 
 from fxcrack.continuum import Continuum
 from fxcrack.steps.evaluate import TipValues
+from fxcrack.steps.records import bond_state
 
 if TYPE_CHECKING:
     from fxcrack.scene import Scene
@@ -163,10 +164,11 @@ def _fields_of(
         if growth.p == p:
             tips = growth.tips()
             front[tips.node] = 1
+            at_front |= bond_state(growth, scene.ramps, time)
             for node, moment in growth.released:
                 when[node] = moment
             if model.active[p]:
-                at_front = _at_front(growth.evaluate(tips, model.state, time), surface.n_nodes)
+                at_front |= _at_front(growth.evaluate(tips, model.state, time), surface.n_nodes)
     return InterfaceFields(
         displacement=in_space(slave),
         opening=in_space(opening),

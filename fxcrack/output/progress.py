@@ -50,7 +50,8 @@ class Progress:
 
 def line(event: str, row: Row) -> str:
     """One line for a row: time, the first reaction, crack lengths, criteria."""
-    parts = [f"{event:<9} t = {row['time']:.5g}"]
+    clock = f"N = {row['N']:.5g}" if "N" in row else f"t = {row['time']:.5g}"
+    parts = [f"{event:<9} {clock}"]
     load = next((k for k in row if k.startswith("R[") and f"u{k[1:]}" in row), None)
     if load is not None:
         parts.append(f"{load} = {row[load]:.5g}")

@@ -327,7 +327,8 @@ def _direction(
 ) -> tuple[Array, bool]:
     """Where to go: Newton's step (True: it ends there), or a direction of negative curvature.
 
-    A slope below ``level`` counts as none. Bonds that would close on the way hold their force and leave the softening set.
+    A slope below ``level`` counts as none. Bonds that would close on the way hold their force
+    and leave the softening set.
     """
     opens = opens.copy()
     while True:

@@ -95,7 +95,9 @@ class _AtDistance:
 
     def where(self, node: int) -> str:
         """Interface and tip in words."""
-        place = ", ".join(f"{c:.6g}" for c in self.surface.x[node, : self.model.continuum.gdim])
+        x = self.surface.x[node, : self.model.continuum.gdim]
+        x = np.where(np.abs(x) < 1e-9 * self.paths.longest, 0.0, x)
+        place = ", ".join(f"{c:.6g}" for c in x)
         return f"interface '{self.model.pairs[self.p].title}', tip at ({place})"
 
     def breaks(self) -> tuple[float, ...]:
@@ -115,8 +117,8 @@ class StressEvaluator(_AtDistance):
         criterion: Strengths and distance.
 
     Raises:
-        InputError: The distance lies outside the bonded part ahead of an initial tip, or a
-            strength depends on temperature.
+        InputError: The distance lies outside the bonded part ahead of an initial tip on a line
+            (a warning on a surface), or a strength depends on temperature.
     """
 
     behind = 0.0
@@ -134,11 +136,14 @@ class StressEvaluator(_AtDistance):
         way = self.paths.ahead(tips, i, self.distance * (1.0 - 1e-12))
         reach = float(way.s[-1])
         if self.distance > reach * (1.0 + 1e-12) and self._starting:
-            raise InputError(
+            problem = (
                 f"{self.where(int(tips.node[i]))}: CriticalStress distance {self.distance:g} lies "
-                f"outside the bonded part, which ends {reach:g} ahead of the tip; give a smaller "
-                "distance"
+                f"outside the bonded part, which ends {reach:g} ahead of the tip"
             )
+            if self.surface.dim == 1:
+                raise InputError(f"{problem}; give a smaller distance")
+            # the direction of growth may point out of the side of a body
+            log.warn("%s; the stress at its last node is used", problem)
         if len(way.nodes) == 1:
             return way.nodes, np.ones(1)
         return _on_face(way, way.s[:, None], min(self.distance, reach), self.surface.order)

@@ -2,8 +2,8 @@
 
 DBT time of failure, ENRRT energy release rates (I, II, III) at failure, EFENRRTR the criterion's
 value then (G_equiv/G_equivC for the VCCT family), OPENBC opening behind the crack when the
-criterion was met, CRSTS bond stress at failure (normal, growth direction, front tangent). BDSTAT, DBSF and DBS (bond state, remaining
-fraction and stress) change with time and are read off the model.
+criterion was met, CRSTS bond stress at failure (normal, growth direction, front tangent). BDSTAT
+and DBSF (bond state, remaining fraction of the force) change with time and are read off the model.
 """
 
 from __future__ import annotations
