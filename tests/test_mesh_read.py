@@ -63,6 +63,8 @@ def corners(mesh: Mesh, group: Group) -> np.ndarray:
     element = reference(domain.topology.cell_name(), mesh.order)
     width = len(element.entity_closure_dofs[group.dim][0])
     n_vertices = len(basix.topology(element.cell_type)[group.dim][0])
+    if not len(group.entities):  # DOLFINx 0.9 divides by their number
+        return np.zeros((0, n_vertices, 3))
     nodes = dolfinx.mesh.entities_to_geometry(domain, group.dim, group.entities)
     return domain.geometry.x[nodes.reshape(len(group.entities), width)[:, :n_vertices]]
 

@@ -150,7 +150,7 @@ def test_ramp_over_increments_needs_increments():
         )
     )
     final = history.rows[-1]
-    assert final["a[bond]"] >= 36.0
+    assert final["a[bond]"] >= 36.0 - 1e-9  # a sum of element lengths
     assert abs(final["balance"]) < 1e-9 * final["external_work"]  # piecewise linear throughout
 
 

@@ -11,6 +11,7 @@ import pytest
 from test_criteria_in_analysis import (
     CORNERS,
     ROUND_OFF,
+    STEEL,
     TENSION,
     assert_balanced,
     outside_two_cracks,
@@ -59,6 +60,36 @@ def test_plate_that_comes_apart_under_a_force_ends_in_the_last_equilibrium() -> 
     assert scene.model.fronts[0].bonded.sum() in (1, 2)  # the last node, or both ends at once
     assert np.isfinite(history["strain_energy"]).all()
     assert_balanced(history)
+
+
+@pytest.mark.parametrize("name", CRITERIA)
+def test_bonds_in_the_normal_direction_only(name: str) -> None:
+    def sheared(normal_only: bool) -> fx.Scene:
+        whole = plate(CRITERIA[name])
+        whole.close()
+        bond = replace(whole.debonds[0].interface, normal_only=normal_only)
+        return fx.Scene(
+            whole.mesh,
+            materials=STEEL,
+            model=fx.PlaneStrain(),
+            supports=[
+                fx.Displacement("bottom", x=0.0, y=0.0), fx.Displacement("top", x=0.3, y=1.0)
+            ],
+            debonds=[fx.Debond(bond, CRITERIA[name])],
+        )  # fmt: skip
+
+    tied, slips = sheared(False), sheared(True)
+    for scene in (tied, slips):
+        history = run(scene, fx.Releases(6))
+        assert_balanced(history)
+        assert scene.growths[0].n_released >= 6
+    shear = [h.history["R[top.x]"] / np.maximum(h.history["time"], 1e-300) for h in (tied, slips)]
+    assert (shear[0][1:] > 1.0).all()
+    # nothing but the opening is transmitted, and the plate has no other hold of its upper half;
+    # the stiffness is of order 1e5
+    assert np.abs(slips.history["R[top.x]"]).max() < 1e-6
+    if name == "length":
+        assert release_times(slips) == pytest.approx(release_times(tied), rel=ROUND_OFF)
 
 
 # --- one after the other, and not at all ----------------------------------------------------------

@@ -132,7 +132,7 @@ def chain(comm: MPI.Intracomm) -> fx.Scene:
         model=fx.PlaneStress(),
         supports=[
             fx.Displacement("a_bottom", x=0.0, y=0.0),
-            fx.Displacement("c_top", x=1.0),
+            fx.Displacement("c_top", x=1.0, y=0.0),
         ],
         loads=[fx.Traction("c_bottom", (0.0, 0.5))],
         debonds=[fx.Debond(crack, fx.VCCT(GIc=0.2))],
@@ -309,7 +309,7 @@ def close(a: Array, b: Array) -> bool:
 
 def run(name: str, comm: MPI.Intracomm) -> fx.Scene:
     scene = SCENES[name](comm)
-    scene.run(fx.Static(until=fx.Releases(3)))
+    scene.run(fx.Static(until=fx.Releases(2)))
     return scene
 
 
@@ -410,8 +410,8 @@ def test_displacements_meet_their_conditions(comm: MPI.Intracomm, name: str) -> 
                 scene.model.state, scene.model.index[0][closed, 0]
             )
             assert pressure.min() > 0.0
-    # forces of bonds and supports balance the loads, and those of each bond balance themselves
-    for c in range(oracle.gdim):
+    # reactions balance the loads, save for radial forces, of which a ring balances its own
+    for c in range(name == "ring", oracle.gdim):
         reactions = sum(r for d, r in oracle.reaction.items() if d % oracle.gdim == c)
         assert reactions + oracle.f[c :: oracle.gdim].sum() == pytest.approx(0.0, abs=RTOL * size)
     scene.close()

@@ -22,6 +22,7 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
+from fxcrack.solve.rigid import check_held
 from fxcrack.solve.softening import SoftBond
 from fxcrack.solve.window import CostModel, choose_roles
 
@@ -115,6 +116,7 @@ class CondensedModel:
     def _rebase(self) -> None:
         if self._stiffness is None:
             start = time.perf_counter()
+            check_held(self.continuum, self.supports)
             self.continuum.compile()
             self.timings.add("compile", start)
             start = time.perf_counter()

@@ -288,9 +288,14 @@ class March:
 
     def _curves_have_ended(self) -> bool:
         """Whether growth follows curves of time alone, which end before the step does."""
-        ends = [getattr(g.evaluator, "ends", np.inf) for g in self.growths if len(g.tips())]
-        unlimited = self._end_time >= _LARGE and not self._breaks_ahead()
-        return unlimited and bool(ends) and max(ends) <= self.time
+        ends = [
+            getattr(g.evaluator, "ends", np.inf)
+            for g, v in zip(self.growths, self._values, strict=True)
+            if len(v.tips)
+        ]
+        if not ends or max(ends) > self.time:
+            return False
+        return self._end_time >= _LARGE and not self._breaks_ahead()
 
     def _unload_to_event(self) -> None:
         if not self._walk(0.0, upward=False):
