@@ -187,6 +187,7 @@ def _refactoring(
         "seconds": setup + slowest(matrices.comm, sum(seconds)) + (n_events - len(events)) * each,
         "setup": setup,
         "per_release": each,
+        "per_release_ordered_anew": slowest(matrices.comm, seconds[0]),
         "measured_releases": len(events),
         "all_releases": n_events,
         "scaled": len(events) < n_events,

@@ -97,6 +97,7 @@ class Front:
         self.title = title
         self.bonded = bonded.copy()
         self.version = 0
+        self.tied = np.zeros(surface.n_nodes, dtype=bool)
         self._cache: dict[int, Tip | None] = {}
         facets = surface.facets
         flat = np.argsort(facets.ravel(), kind="stable")
@@ -192,7 +193,7 @@ class Front:
                 "unit is defined on them; use first-order tetrahedra or second-order hexahedra, "
                 "or tie it (Scene(bonds=...))"
             )
-        bonded = np.flatnonzero(self.bonded & ~self._is_middle)
+        bonded = np.flatnonzero(self.bonded & ~self._is_middle & ~self.tied)
         if not hasattr(self, "_near"):
             self._near = self._pad_links()
         ends, middles = self._near

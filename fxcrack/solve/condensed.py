@@ -156,6 +156,8 @@ class CondensedModel:
         self._cost.observe(coordinates.n_window, seconds)
         self.frames, self.index = coordinates.frames, coordinates.index
         self.held_by_supports = coordinates.held
+        for front, held in zip(self.fronts, coordinates.held, strict=True):
+            front.tied = held.all(axis=1)
         self.system = JumpSystem(
             self._condensation.schur, coordinates.n_window, self.n_loads, len(self.loads)
         )

@@ -178,10 +178,17 @@ class March:
 
     def _run_increments(self) -> str:
         control = IncrementControl(self.step)
+        done = 0
         while True:
             reason = self._ended()
             if reason:
                 return reason
+            done += 1
+            if done > self.step.max_increments:
+                return (
+                    f"stopped: {self.step.max_increments} increments done without reaching the "
+                    "end condition; raise max_increments or maximum, or end the step at a Time"
+                )
             control.size = max(control.size, min(self._scaled(), self.step.maximum))
             target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
             states = self.model.system.snapshot()

@@ -23,6 +23,7 @@ class Static:
         maximum: Largest increment.
         growth: Factor on the increment after an accepted one.
         cutback: Factor on the increment after a rejected one.
+        max_increments: Increments allowed in the step.
         max_cutbacks: Cutbacks allowed in one increment.
         linear_scaling: Factor beta (0.9 is usual) with which increments before the first release
             head straight for it, assuming a proportional load; ``None`` does not.
@@ -36,6 +37,7 @@ class Static:
     growth: float = 1.5
     cutback: float = 0.5
     max_cutbacks: int = 5
+    max_increments: int = 10_000
     linear_scaling: float | None = None
 
     def __post_init__(self) -> None:
