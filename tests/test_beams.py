@@ -36,7 +36,7 @@ def test_mixed_mode_bending() -> None:
     ratio = 4.0 / 3.0 * ((3 * c - half_span) / (c + half_span) * ae / ae2) ** 2
     assert one / two == pytest.approx(ratio, rel=1e-12)
     assert T300.mmb_rates(a, p, half_span / 3.0, half_span)[0] == 0.0
-    # lever force P c/L at the end: as a DCB under P (3c - L)/(4L); bending as an ENF under P (c+L)/L
+    # as a DCB under P (3c - L)/(4L), and as an ENF under P (c + L)/L
     opening = p * (3 * c - half_span) / (4.0 * half_span)
     assert one == pytest.approx(12.0 * opening**2 * ae**2 / (25.0**2 * 1.5**3 * T300.E), rel=1e-12)
     assert two == pytest.approx(T300.enf_rate(a, p * (c + half_span) / half_span), rel=1e-12)

@@ -314,6 +314,4 @@ def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
         r"Monitor\('u_top'\): direction has 2 components, 3 are needed",
         lambda: border_vectors(solid, [], [fx.Monitor("top", (0.0, 1.0))]),
     )
-    refused(
-        "dimension 1 is needed here", lambda: plane.load_vector(fx.Pressure("pin_top", 1.0))
-    )
+    refused("dimension 1 is needed here", lambda: plane.load_vector(fx.Pressure("pin_top", 1.0)))

@@ -120,14 +120,14 @@ def test_lone_midside_node_is_refused(which: str) -> None:
     bonded = beyond(s, 1.4)
     at = 1.7 if which == "open" else 0.65
     bonded[np.argmin(abs(s.x[:, 0] - at))] = which == "bonded"
-    with pytest.raises(InterfaceError, match="is a midside node; .* begin at a corner node"):
+    with pytest.raises(InterfaceError, match=r"is a midside node; .* begin at a corner node"):
         Front(s, bonded, "i")
 
 
 def test_second_order_triangles_are_refused() -> None:
     s = surface("triangle", 2)
     front = Front(s, beyond(s, 1.4), "i")  # it may be tied
-    with pytest.raises(InterfaceError, match="second-order triangular faces: .* or tie it"):
+    with pytest.raises(InterfaceError, match=r"second-order triangular faces: .* or tie it"):
         front.tips()
 
 

@@ -76,7 +76,8 @@ def error(mesh: Mesh, load: str, interface: fx.Interface) -> float:
     vector.destroy()
     n = scene.continuum.n_local // mesh.gdim
     x = np.concatenate(mesh.comm.allgather(scene.continuum.positions()[:n]))
-    exact = ((x + [0.0, 1.0, 0.0]) @ gradient.T)[:, : mesh.gdim]
+    from_bottom = x + np.array([0.0, 1.0, 0.0])
+    exact = (from_bottom @ gradient.T)[:, : mesh.gdim]
     scene.close()
     return float(np.abs(u - exact).max() / np.abs(exact).max())
 

@@ -152,10 +152,12 @@ def ring(comm: MPI.Intracomm) -> fx.Scene:
             fx.Displacement("axis_lower", x=0.0),
             fx.Displacement("bottom", y=0.0),
         ],
-        loads=[fx.Pressure(f"{side}_face", lambda x: 1.0 * (x[0] < 2.0)) for side in ("upper", "lower")],
+        loads=[
+            fx.Pressure(f"{side}_face", lambda x: 1.0 * (x[0] < 2.0)) for side in ("upper", "lower")
+        ],
         debonds=[fx.Debond(bond(2.0), fx.VCCT(GIc=0.2))],
         monitors=[fx.Monitor("top", (0.0, 1.0))],
-    )  # fmt: skip
+    )
 
 
 def bending_with_contact(comm: MPI.Intracomm) -> fx.Scene:
@@ -294,9 +296,7 @@ class Oracle:
     def conjugates(self) -> Array:
         """Reactions and displacements of the force patterns."""
         out = []
-        for column, (dofs, at_one) in zip(
-            self.scene.supports.columns, self.held_by, strict=True
-        ):
+        for column, (dofs, at_one) in zip(self.scene.supports.columns, self.held_by, strict=True):
             reactions = np.array([self.reaction[d] for d in dofs.tolist()])
             uniform = not column.moves or len(set(at_one.tolist())) == 1
             out.append(reactions.sum() if uniform else reactions @ at_one)
@@ -406,9 +406,7 @@ def test_displacements_meet_their_conditions(comm: MPI.Intracomm, name: str) -> 
             assert opening.min() > -1e-10 * np.abs(u).max()
             closed = ~front.bonded & (opening < 1e-10 * np.abs(u).max())
             assert 0 < closed.sum() < (~front.bonded).sum()  # the case has both
-            pressure = scene.model.system.forces(
-                scene.model.state, scene.model.index[0][closed, 0]
-            )
+            pressure = scene.model.system.forces(scene.model.state, scene.model.index[0][closed, 0])
             assert pressure.min() > 0.0
     # reactions balance the loads, save for radial forces, of which a ring balances its own
     for c in range(name == "ring", oracle.gdim):

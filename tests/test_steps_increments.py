@@ -52,7 +52,9 @@ def test_gives_up() -> None:
     ):
         c.rejected(0.25, "f = 1.5")
     c = control(initial=1.0, minimum=0.9)
-    with pytest.raises(TooManyCutbacks, match="next increment 0.5 would be below the minimum 0.9"):
+    with pytest.raises(
+        TooManyCutbacks, match=r"next increment 0\.5 would be below the minimum 0\.9"
+    ):
         c.rejected(1.0, "f = 2")
 
 
@@ -133,9 +135,7 @@ def test_nothing_can_grow(caplog: pytest.LogCaptureFixture) -> None:
     )
     assert scene.run(fx.Static(until=fx.Releases(1))).reason == "no crack tip is left"
     assert "has no crack tip" in caplog.text
-    tied = fx.Scene(
-        mesh, materials=STEEL, model=fx.PlaneStrain(), supports=PINS, bonds=[whole]
-    )
+    tied = fx.Scene(mesh, materials=STEEL, model=fx.PlaneStrain(), supports=PINS, bonds=[whole])
     history = tied.run(fx.Static(until=fx.Time(2.0)))
     assert history.reason == "time 2 reached"
     assert history["u[pin_top.y]"][-1] == 2.0

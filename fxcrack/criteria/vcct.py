@@ -19,6 +19,8 @@ from fxcrack.criteria.checks import Array, not_negative, number, one_of
 from fxcrack.criteria.rate_criterion import NORMALISATIONS, Normalisation, RateCriterion
 from fxcrack.errors import InputError
 
+_OWNER = "VCCT"
+
 
 def energy_release_rates(
     force: npt.ArrayLike,
@@ -76,24 +78,36 @@ def energy_release_rates(
         InputError: Shapes disagree, a length or width is not positive, or ``normalisation`` is
             unknown.
     """
-    owner = "VCCT"
-    one_of(owner, "normalisation", normalisation, NORMALISATIONS)
     f = np.asarray(force, dtype=np.float64)
-    w = np.array(opening, dtype=np.float64)
+    w = np.asarray(opening, dtype=np.float64)
     if f.shape != w.shape or f.ndim != 3 or f.shape[1] not in (1, 2) or f.shape[2] != 3:
         raise InputError(
-            f"{owner}: forces have shape {f.shape} and openings {w.shape}; "
+            f"{_OWNER}: forces have shape {f.shape} and openings {w.shape}; "
             "both must be (n, 1, 3) or, for second order, (n, 2, 3)"
         )
     ahead, behind, b = (
         np.broadcast_to(np.asarray(v, dtype=np.float64), f.shape[:1])
         for v in (d_ahead, d_behind, width)
     )
+    return weighted_rates(f, w, closure_weights(ahead, behind, b, f.shape[1], normalisation))
+
+
+def closure_weights(
+    ahead: Array, behind: Array, width: Array, n_products: int, normalisation: Normalisation
+) -> Array:
+    """What :func:`energy_release_rates` multiplies the products F w with.
+
+    Returns:
+        Shape (n, n_products) [1/length^2].
+
+    Raises:
+        InputError: As there.
+    """
+    one_of(_OWNER, "normalisation", normalisation, NORMALISATIONS)
     end_allowed = normalisation in ("tributary", "behind")
-    _check_lengths(owner, "d_ahead", ahead, zero=end_allowed)
-    _check_lengths(owner, "d_behind", behind, zero=False)
-    _check_lengths(owner, "width", b, zero=False)
-    w[..., 0] = np.maximum(w[..., 0], 0.0)
+    _check_lengths(_OWNER, "d_ahead", ahead, zero=end_allowed)
+    _check_lengths(_OWNER, "d_behind", behind, zero=False)
+    _check_lengths(_OWNER, "width", width, zero=False)
     if normalisation == "tributary":
         corner = np.sqrt((ahead + behind) / 2.0 * behind)
         midside = np.sqrt(ahead * behind)
@@ -103,10 +117,18 @@ def energy_release_rates(
             "ahead_sqrt": np.sqrt(ahead * behind),
             "behind": behind,
         }[normalisation]
-    lengths = np.stack([corner, midside], axis=-1)[:, : f.shape[1]]
+    lengths = np.stack([corner, midside], axis=-1)[:, :n_products]
     # Where the surface ends there is no midside node ahead and its length is 0.
     weight = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
-    return np.asarray((f * w * weight[..., None]).sum(axis=1) / (2.0 * b[:, None]))
+    return np.asarray(weight / (2.0 * width[:, None]))
+
+
+def weighted_rates(force: Array, opening: Array, weights: Array) -> Array:
+    """:func:`energy_release_rates` with weights at hand."""
+    products = force * opening
+    # closed wake nodes do not count for mode I
+    products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)
+    return np.asarray((products * weights[..., None]).sum(axis=1))
 
 
 def _check_lengths(owner: str, name: str, values: Array, *, zero: bool) -> None:

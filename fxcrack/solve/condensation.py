@@ -168,7 +168,9 @@ class Condensation:
         timings.add("transform", start)
         start = time.perf_counter()
         if method == "schur" or (method == "auto" and library() is not None):
-            self._factor = SchurFactor(self.matrix, coordinates.n_last)
+            self._factor = SchurFactor(
+                self.matrix, coordinates.n_last, gdim=stiffness.getBlockSize()
+            )
             timings.factorizations += 1
             self.schur = self._factor.schur
         else:

@@ -27,6 +27,7 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
+_PROPORTIONAL = 4.0 * np.finfo(float).eps
 _ROUND_OFF = 1e-11
 """Gaps and pressures below this fraction of the largest one count as zero."""
 
@@ -70,6 +71,8 @@ class JumpSystem:
         self.schur = schur
         self.n_window = n_window
         self.load_columns = np.arange(n_window, n_window + n_loads)
+        # rows of S for jumps and loads; slices, so that products need no copies
+        self._by_load = schur[n_window : n_window + n_loads, : n_window + n_loads]
         self.monitor_rows = np.arange(n_window + n_loads, len(schur))
         self.sign = np.ones(n_loads)
         self.sign[n_loads - n_forces :] = -1.0
@@ -82,7 +85,7 @@ class JumpSystem:
         self.cholesky = GrowingCholesky(schur)
         self.soft = SoftSet(schur)
         self._forward = np.zeros((0, n_loads))
-        self._unit: Array | None = None
+        self._unit: tuple[Array, Array] | None = None
 
     # -- states --------------------------------------------------------------------------
 
@@ -97,7 +100,7 @@ class JumpSystem:
             return
         left = self.cholesky.append(new)
         n, k = left.shape[1], len(new)
-        right = self.schur[np.ix_(new, self.load_columns)] - left @ self._forward
+        right = self._by_load[:, new].T - left @ self._forward
         tile = self.cholesky._rows[n : n + k, n : n + k]
         self._forward = np.vstack([self._forward, np.linalg.solve(tile, right)])
         if self.soft.bonds:
@@ -155,17 +158,28 @@ class JumpSystem:
 
     # -- equilibrium with given states ---------------------------------------------------
 
-    def _response(self) -> Array:
-        """Jumps of the free components per unit load, shape (n_free, n_loads)."""
-        if self._unit is None:
-            self._unit = -self.cholesky.backward(self._forward)
-        return self._unit
+    def _response(self, loads: Array) -> Array:
+        """Jumps of the free components under loads alone, shape (n_free,).
+
+        Loads proportional to the last ones cost no further back-substitution; one with a single
+        right-hand side takes a third of the time of one with several.
+        """
+        if self._unit is not None:
+            known, jump = self._unit
+            scale = float(known @ loads) / float(known @ known)
+            if np.abs(loads - scale * known).max() <= _PROPORTIONAL * np.abs(loads).max():
+                return scale * jump
+        if not loads.any():
+            return np.zeros(len(self.cholesky))
+        jump = -self.cholesky.backward(self._forward @ loads)
+        self._unit = loads, jump
+        return jump
 
     def linear(self, loads: Array, force: Array) -> Equilibrium:
         """Equilibrium with the states as they are, contact conditions unchecked."""
         free = self.cholesky.free
         jump = np.where(self.closed, -self.gap, 0.0)
-        part = self._response() @ loads
+        part = self._response(loads)
         right = force[free]
         held = np.flatnonzero(jump)
         if len(held):
@@ -175,10 +189,7 @@ class JumpSystem:
         jump[free] = part
         if self.soft.bonds:
             force = self._add_soft(jump, loads, force)
-        columns = self.load_columns
-        active = np.flatnonzero(jump)
-        conjugate = self.schur[np.ix_(columns, active)] @ jump[active]
-        conjugate += self.schur[np.ix_(columns, columns)] @ loads
+        conjugate = self._by_load @ np.concatenate([jump, loads])
         return Equilibrium(loads, force, jump, self.sign * conjugate)
 
     def _soft_right(self, jump: Array, loads: Array) -> Array:
@@ -212,9 +223,8 @@ class JumpSystem:
 
     def forces(self, state: Equilibrium, rows: Ints) -> Array:
         """Interface forces on the slave side at some components, shape (len(rows),)."""
-        active = np.flatnonzero(state.jump)
-        out = self.schur[np.ix_(rows, active)] @ state.jump[active]
-        return np.asarray(out + self.schur[np.ix_(rows, self.load_columns)] @ state.loads)
+        x = np.concatenate([state.jump, state.loads])
+        return np.asarray(self.schur[rows, : len(x)] @ x)
 
     def monitors(self, state: Equilibrium) -> Array:
         """Monitored displacements, shape (n_monitors,)."""

@@ -2,7 +2,7 @@
 
 Ahead of the front the window holds the bonded nodes the crack may reach before the next rebase;
 behind it, the wake the criterion looks at; with contact, all open normals. How far it reaches is
-the number of rows k that makes  (L/k) (t_plain + c n(k)^2)  smallest: L rows to go, n window
+the number of nodes k that makes  ceil(L/k) (t_plain + c n(k)^2)  smallest: L nodes to go, n window
 components, c the cost of an entry of S, refitted from the last factorisation.
 """
 
@@ -68,8 +68,8 @@ class CostModel:
         """
         if not len(counts):
             return 0
-        share = np.arange(1, len(counts) + 1) / len(counts)
-        seconds = (self.plain + self.per_entry * counts.astype(float) ** 2) / share
+        times = np.ceil(len(counts) / np.arange(1, len(counts) + 1))
+        seconds = (self.plain + self.per_entry * counts.astype(float) ** 2) * times
         return int(np.argmin(seconds)) + 1
 
 

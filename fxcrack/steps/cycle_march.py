@@ -349,7 +349,7 @@ def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> A
 
 def advance(tips: Tips) -> Array:
     """Distance by which releasing each tip moves the front, shape (n,), length."""
-    return tips.area / tips.width
+    return np.where(tips.d_ahead > 0.0, tips.d_ahead, tips.area / tips.width)
 
 
 def _lengths(growth: Growth, tips: Tips) -> list[float]:

@@ -20,8 +20,8 @@ from fxcrack.criteria import (
     RateCriterion,
     Release,
     closure_rates,
-    energy_release_rates,
 )
+from fxcrack.criteria.vcct import closure_weights, weighted_rates
 from fxcrack.interface.front import Tips
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
@@ -38,11 +38,15 @@ class TipValues:
         tips: Front nodes.
         f: Criterion, shape (n,).
         report: Quantities behind it by name, each of shape (n,), e.g. GI, GII, GIII.
+        measured: What f was found from, shape (n, m), if it is to be used again.
+        state: The equilibrium it belongs to.
     """
 
     tips: Tips
     f: Array
     report: dict[str, Array]
+    measured: Array | None = None
+    state: Equilibrium | None = None
 
     @property
     def largest(self) -> int:
@@ -100,6 +104,8 @@ class RateEvaluator:
         self.model = model
         self.p = p
         self.criterion = criterion
+        self._weighed: Tips | None = None
+        self._weights = np.zeros((0, 1))
         surface = model.fronts[p].surface
         criterion.check_slaves(surface.n_nodes)
         x = surface.x[:, : model.continuum.gdim]
@@ -126,14 +132,11 @@ class RateEvaluator:
         force, opening = (m.reshape(len(tips), -1, 3) for m in np.split(measured, [half], axis=1))
         if self.criterion.method == "closure":
             return closure_rates(force, opening, tips.area)
-        return energy_release_rates(
-            force,
-            opening,
-            tips.d_ahead,
-            tips.d_behind,
-            tips.width,
-            normalisation=self.criterion.normalisation,
-        )
+        if tips is not self._weighed:
+            lengths = (tips.d_ahead, tips.d_behind, tips.width)
+            self._weights = closure_weights(*lengths, force.shape[1], self.criterion.normalisation)
+            self._weighed = tips
+        return weighted_rates(force, opening, self._weights)
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and GI, GII, GIII."""
@@ -172,6 +175,10 @@ class RateEvaluator:
         return ()
 
 
+_ROUND_OFF = 1e-13
+"""Differences below this fraction of the largest value do not make a path bend."""
+
+
 def repeat_tips(tips: Tips, times: int) -> Tips:
     """The same tips several times over, first all of them once, then again."""
     if times == 1:
@@ -189,6 +196,7 @@ def first_crossing(
     ends: tuple[tuple[Equilibrium, float], tuple[Equilibrium, float]],
     *,
     upward: bool = True,
+    known: TipValues | None = None,
 ) -> float | None:
     """First fraction of a linear piece at which the largest f crosses 1.
 
@@ -197,14 +205,27 @@ def first_crossing(
         tips: Front nodes.
         ends: Equilibrium and time at both ends.
         upward: Look for f rising to 1, or falling to it.
+        known: What was found before, perhaps at the first end.
 
     Returns:
         Fraction between 0 and 1, ``None`` if f stays on its side.
     """
     if not len(tips):
         return None
-    a, b = (evaluator.measure(tips, state, time) for state, time in ends)
+    a, b = (
+        known.measured
+        if known is not None and known.measured is not None and known.state is state
+        else evaluator.measure(tips, state, time)
+        for state, time in ends
+    )
     n = len(tips)
+    if known is not None and known.measured is a and known.f.max() > 0.0:
+        scale = float(np.vdot(a, b) / np.vdot(a, a))
+        if np.abs(b - scale * a).max() <= _ROUND_OFF * np.abs(b).max():
+            # proportional: f grows with a power of the load
+            rise = known.f.max() ** (-1.0 / evaluator.degree) - 1.0
+            x = rise / (scale - 1.0) if scale != 1.0 else np.inf
+            return float(x) if 0.0 <= x <= 1.0 else None
 
     def root(x: Array) -> Array:
         many = np.concatenate([(1.0 - y) * a + y * b for y in x])

@@ -138,14 +138,15 @@ class Growth:
         """F at the tips and what is behind it."""
         if not len(tips):
             return TipValues(tips, np.zeros(0), {})
-        f, report = self.evaluator.value(tips, self.evaluator.measure(tips, state, time))
+        measured = self.evaluator.measure(tips, state, time)
+        f, report = self.evaluator.value(tips, measured)
         for other in self.watched:
             report = {**other.value(tips, other.measure(tips, state, time))[1], **report}
-        return TipValues(tips, f, report)
+        return TipValues(tips, f, report, measured, state)
 
     def crossing(
         self,
-        tips: Tips,
+        values: TipValues,
         a: Equilibrium,
         b: Equilibrium,
         times: tuple[float, float],
@@ -153,7 +154,8 @@ class Growth:
         upward: bool,
     ) -> float | None:
         """First fraction of the linear way from a to b at which the largest f crosses 1."""
-        return first_crossing(self.evaluator, tips, ((a, times[0]), (b, times[1])), upward=upward)
+        ends = ((a, times[0]), (b, times[1]))
+        return first_crossing(self.evaluator, values.tips, ends, upward=upward, known=values)
 
     def ready(self, values: TipValues, level: float = 1.0) -> Ints:
         """Positions of the tips to let go: the critical one and those tied with it."""
