@@ -29,9 +29,7 @@ pytestmark = pytest.mark.demos
 
 def balanced(history: fx.History) -> bool:
     """Whether the energy balance closes to 1e-6 of the largest work."""
-    return bool(
-        np.abs(history["balance"]).max() <= 1e-6 * np.abs(history["external_work"]).max()
-    )
+    return bool(np.abs(history["balance"]).max() <= 1e-6 * np.abs(history["external_work"]).max())
 
 
 def test_dcb_is_close_to_beam_theory():

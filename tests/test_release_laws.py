@@ -110,7 +110,7 @@ def test_enhanced_vcct_with_equal_toughness_is_progressive_vcct():
 
 
 def test_softening_bond_unloads_along_its_secant_and_loads_again():
-    scene, bond = beam(fx.Progressive())
+    scene, _ = beam(fx.Progressive())
     scene.run(fx.Static(until=fx.Releases(1)))
     system = scene.model.system
     top = scene.time

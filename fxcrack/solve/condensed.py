@@ -306,6 +306,8 @@ class CondensedModel:
             nodes = np.unique(tips.force_nodes[i])
             index = self.index[p][nodes]
             slot = index >= 0
+            if force[i, : len(nodes), 0].sum() <= 0.0:
+                slot[:, 0] = False  # pressed together: it stays closed, shear alone is released
             _, star = self.system.cholesky.reduced(index[slot])
             vector = np.einsum("ci,ki->kc", tips.frame[i], force[i, : len(nodes)])
             order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
