@@ -435,7 +435,8 @@ def test_unstable_growth(unstable: float | None, reason: str, least: float, most
 # -- ends ------------------------------------------------------------------------------------------
 
 
-def test_total_separation() -> None:
+@pytest.mark.parametrize("method", ["vcct", "closure"])
+def test_total_separation(method: str) -> None:
     """The upper arm hangs on the bond alone: two nodes hold it, one would let it turn."""
     scene = specimen(
         dcb_2d(MPI.COMM_SELF, length=20.0, dx=1.0, ny=2),
@@ -445,6 +446,7 @@ def test_total_separation() -> None:
             fx.Displacement("far_lower", x=0.0, y=0.0),
         ],
         loads=[fx.Traction("top", (0.0, 1.0))],
+        criterion=fx.VCCT(GIc=0.2, method=method),
     )
     history = scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 50.0)))
     assert history.reason.startswith("total separation: letting the next node go would leave")
@@ -555,12 +557,30 @@ def test_wake_closes_again() -> None:
 # -- closure ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["DCB", "second order", "3-D", "ring", "contact"])
+def pressed_specimen(comm: MPI.Intracomm, **options: object) -> fx.Scene:
+    """Arms of different stiffness in bending, pressed together: at first open, then closed tips."""
+    return specimen(
+        enf_2d(comm, half_span=20.0, height=1.5, dx=0.5, ny=2),
+        a0=14.5,
+        contact=True,
+        materials={"upper": fx.Isotropic(70e3, 0.3), "lower": fx.Isotropic(2e3, 0.0)},
+        model=fx.PlaneStrain(25.0),
+        supports=[
+            fx.Displacement("support_left", y=0.0),
+            fx.Displacement("support_right", x=0.0, y=0.0),
+            fx.Displacement("load", y=-1.0),
+        ],
+        loads=[fx.Pressure("top", lambda x: np.where(x[0] < 25.0, 150.0, 0.0))],
+        **options,
+    )
+
+
+@pytest.mark.parametrize("name", ["DCB", "second order", "3-D", "ring", "contact", "pressed"])
 def test_closure_is_the_energy_released(name: str) -> None:
     """G times the area of a unit is the energy its bond forces give up on their way to zero."""
-    make, _ = RUNS[name]
+    make = pressed_specimen if name == "pressed" else RUNS[name][0]
     scene = make(MPI.COMM_SELF, criterion=fx.VCCT(GIc=0.05, method="closure"))
-    checked = 0
+    checked = closed = 0
     for _ in range(5):
         count = scene.history.rows[-1]["released[bond]"] if scene.history.rows else 0
         first = len(scene.history)
@@ -577,4 +597,6 @@ def test_closure_is_the_energy_released(name: str) -> None:
         released = end["released_energy"] - begin["released_energy"]
         assert released == pytest.approx(g * tips.area[unit], rel=1e-6)
         checked += 1
+        closed += begin["GI[bond]"] == 0.0
     assert checked >= 3
+    assert (closed > 0) == (name == "pressed")

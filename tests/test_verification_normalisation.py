@@ -54,7 +54,7 @@ def rates(x: Array) -> tuple[Array, dict[str, Array]]:
 
 @pytest.fixture(scope="module")
 def fine() -> tuple[Array, Array]:
-    """Lengths and G_I on the even mesh of 1600 elements; 0.05 % from one of 3200."""
+    """Lengths and G_I on the even mesh of 1600 elements; 0.07 % from one of 3200."""
     lengths, found = rates(np.linspace(0.0, 100.0, 1601))
     return lengths, found["tributary"]
 

@@ -133,7 +133,7 @@ class GrowingCholesky:
         """
         extra = np.asarray(extra, dtype=np.int64)
         y, star = self.reduced(extra)
-        tile = self._factorise(star, extra)
+        tile = self.factorise(star, extra)
         n, k = len(self.free), len(extra)
         self._reserve(n + k)
         self._rows[n : n + k, :n] = y.T
@@ -141,7 +141,12 @@ class GrowingCholesky:
         self.free = np.concatenate([self.free, extra])
         return y.T
 
-    def _factorise(self, star: Array, extra: Ints) -> Array:
+    def factorise(self, star: Array, extra: Ints) -> Array:
+        """Lower Cholesky factor of S* from :meth:`reduced`, shape (k, k).
+
+        Raises:
+            NotPositiveDefinite: One of the unknowns is restrained by nothing.
+        """
         tile, info = lapack.dpotrf(star, lower=1, clean=1)
         scale = self._matrix[extra, extra]
         bad = np.diagonal(tile) ** 2 <= self._floor * scale

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
+from scipy.linalg import cho_solve
 
 from fxcrack import log
 from fxcrack.continuum import Continuum
@@ -20,6 +21,7 @@ from fxcrack.interface.front import Front, Tips
 from fxcrack.interface.jumps import WINDOW, Supports, build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.loads import Load, Monitor
+from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
 from fxcrack.solve.rigid import check_held
@@ -28,6 +30,9 @@ from fxcrack.solve.window import CostModel, choose_roles
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+_UNBOUNDED = 1e100
+"""Jump per force of a unit that holds a body alone."""
 
 
 @dataclass(frozen=True)
@@ -309,13 +314,17 @@ class CondensedModel:
             if force[i, : len(nodes), 0].sum() <= 0.0:
                 slot[:, 0] = False  # pressed together: it stays closed, shear alone is released
             _, star = self.system.cholesky.reduced(index[slot])
+            try:
+                factor = self.system.cholesky.factorise(star, index[slot])
+            except NotPositiveDefinite:
+                factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
             vector = np.einsum("ci,ki->kc", tips.frame[i], force[i, : len(nodes)])
             order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
             local = np.einsum("kci,kc->ki", self.frames[p][nodes[order]], vector[:, :gdim])
             right = np.zeros((len(nodes), gdim))
             right[order] = local
             jump = np.zeros((len(nodes), gdim))
-            jump[slot] = np.linalg.solve(star, right[slot])
+            jump[slot] = cho_solve((factor, True), right[slot])
             jump = jump[order]
             world = np.zeros((len(nodes), 3))
             world[:, :gdim] = np.einsum("kci,ki->kc", self.frames[p][nodes[order]], jump)
