@@ -193,3 +193,29 @@ def test_bonded_in_the_normal_direction_only(comm: MPI.Intracomm) -> None:
     assert abs(row["R[pin_top.x]"]) < 1e-10 * 4.0  # of the tension
     assert row["strain_energy"] == pytest.approx(0.5 * 8.0 / E, rel=1e-10)
     scene.close()
+
+
+@pytest.mark.mpi
+def test_block_that_contact_alone_holds(comm: MPI.Intracomm) -> None:
+    """The upper arm lies loose on the lower one and is pressed on it: uniform compression."""
+    mesh = dcb_2d(comm, length=10.0, height=1.0, dx=1.0, ny=2)
+    contact = fx.Interface(
+        slave="upper_face", master="lower_face", bonded=lambda x: x[0] < -1.0, contact=True
+    )
+    scene = fx.Scene(
+        mesh,
+        materials=fx.Isotropic(E, 0.0),
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("bottom", y=0.0),
+            fx.Displacement("far_lower", x=0.0),
+            fx.Displacement("far_upper", x=0.0),
+        ],
+        bonds=[contact],
+        loads=[fx.Traction("top", (0.0, -1.0))],
+        monitors=[fx.Monitor("top", (0.0, 1.0), name="top")],
+    )
+    row = scene.run(fx.Static(until=fx.Time(1.0))).rows[-1]
+    # nu = 0: two heights of 1 shorten by p h/E each; the answer is linear, so round-off
+    assert row["m[top]"] == pytest.approx(-2.0 / E, rel=1e-9)
+    scene.close()

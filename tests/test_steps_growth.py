@@ -416,7 +416,7 @@ def test_unstable_growth(unstable: float | None, reason: str, least: float, most
     )
     history = grow_to(scene, 99.0, stepping="increment", initial=0.05, maximum=0.05)
     assert history.reason.startswith(reason)
-    assert least <= history.rows[-1]["a[bond]"] <= most
+    assert least - 1e-9 <= history.rows[-1]["a[bond]"] <= most + 1e-9  # a sum of lengths
     load = column(history.rows, "F[pin_top]")
     released = column(history.rows, "released[bond]")
     if unstable is None:

@@ -17,6 +17,7 @@ from scipy.linalg import cho_solve
 
 from fxcrack import log
 from fxcrack.continuum import Continuum
+from fxcrack.errors import SolverError
 from fxcrack.interface.front import Front, Tips
 from fxcrack.interface.jumps import WINDOW, Supports, build_coordinates
 from fxcrack.interface.pairing import Pair
@@ -24,6 +25,7 @@ from fxcrack.loads import Load, Monitor
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
+from fxcrack.solve.petsc_schur import mumps_message
 from fxcrack.solve.rigid import check_held
 from fxcrack.solve.softening import SoftBond
 from fxcrack.solve.window import CostModel, choose_roles
@@ -189,13 +191,28 @@ class CondensedModel:
             free = index[is_open]
             free = free[(free >= 0) & ~np.isin(free, soft)]
             if len(free):
-                self.system.release(free)
+                self._free_open(pair, index[is_open & pair.paired, 0], free)
             if pair.interface.contact:
                 self._let_touch(pair, front, index)
         self.system.soft.finished = self._taken
         if bonds:
             self.system.contact[soft] = False
             self.system.soften(bonds)
+
+    def _free_open(self, pair: Pair, normals: Ints, free: Ints) -> None:
+        """Free open components; a body that only contact holds begins with all of it closed.
+
+        Raises:
+            SolverError: Nothing holds a body once its open part is open.
+        """
+        try:
+            self.system.release(free)
+        except NotPositiveDefinite as error:
+            if not pair.interface.contact:
+                raise SolverError(mumps_message(-10, 0)) from error
+            normals = normals[normals >= 0]
+            self.system.closed[normals] = True
+            self.system.release(np.setdiff1d(free, normals))
 
     def _let_touch(self, pair: Pair, front: Front, index: Ints) -> None:
         normals = index[~front.bonded & pair.paired, 0]

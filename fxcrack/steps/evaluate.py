@@ -124,6 +124,10 @@ class RateEvaluator:
             opening = self.model.closure_jumps(self.p, tips, force)
         else:
             opening = self.model.openings(self.p, tips, state)
+            if force.shape[1] == 2:
+                # on a ring the midside force belongs to its own circumference
+                breadth = self.model.fronts[self.p].surface.breadth
+                force[:, 1] *= (breadth[tips.node] / breadth[tips.force_nodes[:, 1]])[:, None]
         return np.concatenate([force.reshape(len(tips), -1), opening.reshape(len(tips), -1)], 1)
 
     def rates(self, tips: Tips, measured: Array) -> Array:
