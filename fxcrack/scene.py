@@ -11,8 +11,8 @@ import numpy.typing as npt
 from fxcrack import log
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError
-from fxcrack.interface.jumps import collect_supports
 from fxcrack.interface.pairing import Interface, make_pair
+from fxcrack.interface.supports import collect_supports
 from fxcrack.loads import Displacement, Load, Monitor
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh

@@ -13,8 +13,9 @@ from specimens import STEEL, bond, gathered, specimen
 import fxcrack as fx
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, InterfaceError
-from fxcrack.interface.jumps import WINDOW, JumpCoordinates, build_coordinates, collect_supports
+from fxcrack.interface.jumps import WINDOW, JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair, make_pair
+from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d

@@ -19,8 +19,9 @@ from fxcrack import log
 from fxcrack.continuum import Continuum
 from fxcrack.errors import SolverError
 from fxcrack.interface.front import Front, Tips
-from fxcrack.interface.jumps import WINDOW, Supports, build_coordinates
+from fxcrack.interface.jumps import WINDOW, build_coordinates
 from fxcrack.interface.pairing import Pair
+from fxcrack.interface.supports import Supports
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors

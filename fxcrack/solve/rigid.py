@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from fxcrack.continuum import Continuum
 from fxcrack.errors import SolverError
-from fxcrack.interface.jumps import Supports
+from fxcrack.interface.supports import Supports
 from fxcrack.models import Axisymmetric
 from fxcrack.solve.petsc_schur import mumps_message
 

@@ -1,0 +1,287 @@
+"""What a quasi-static step keeps: the state, its energies, its tips, the rows of the history.
+
+Energy is accounted for piece by piece: work of supports and force patterns by the trapezoidal
+rule (exact, everything is linear in between), released energy by the bond forces on their way
+to zero; their balance with the strain energy is a check on all of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack import log
+from fxcrack.criteria import Step
+from fxcrack.errors import InputError
+from fxcrack.output.history import History, Row
+from fxcrack.solve.cholesky import NotPositiveDefinite
+from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.jump_system import Equilibrium, bond_work, work_between
+from fxcrack.steps.evaluate import TipValues
+from fxcrack.steps.growth import Growth
+from fxcrack.steps.letting_go import (
+    Letting,
+    TimedRelease,
+    ViscousRelease,
+    bond_forces_of,
+    given_forces,
+)
+from fxcrack.steps.static import Static
+from fxcrack.steps.until import CrackLength, Releases, Time
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+Observer = Callable[[str, Row], None]
+
+LARGE = 1e60
+"""A time that is never reached: the step has no end time."""
+
+
+class Account:
+    """The books of one quasi-static step on a condensed model.
+
+    Args:
+        model: Model with its present state; prepared for the step.
+        growths: Activated debonds.
+        step: Controls.
+        history: Where rows go.
+        loads_at: Amplitudes and load factors at a time, shape (n_loads,).
+        breaks: Times at which an amplitude changes its slope.
+        time: Present time.
+        work: External work so far.
+        released: Energy that left through bonds so far.
+        snapped: The part of it lost where softening bonds ran through unstable states.
+        ramps: Bonds that are letting go with time or over increments; goes on in place.
+        increment: Number of increments so far.
+        observer: Called with the event's name and the row after every event.
+    """
+
+    def __init__(
+        self,
+        model: CondensedModel,
+        growths: list[Growth],
+        step: Static,
+        history: History,
+        loads_at: Callable[[float], Array],
+        breaks: tuple[float, ...],
+        *,
+        time: float = 0.0,
+        work: float = 0.0,
+        released: float = 0.0,
+        snapped: float = 0.0,
+        viscous: float = 0.0,
+        ramps: list[Letting] | None = None,
+        increment: int = 0,
+        observer: Observer | None = None,
+    ) -> None:
+        self.model = model
+        self.growths = growths
+        self.step = step
+        self.history = history
+        self.loads_at = loads_at
+        self.breaks = breaks
+        self.time = time
+        self.work = work
+        self.released = released
+        self._observer = observer
+        self._names = self._column_names()
+        self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=LARGE)
+        self._values: list[TipValues] = []
+        self._ramps: list[Letting] = [] if ramps is None else ramps
+        self.increment = increment
+        self.viscous = viscous
+        # all energy that left through bonds but the softening ones
+        self._by_force = released - model.system.soft.taken(model.state.jump) - snapped
+
+    def _force_at(self, time: float) -> Array:
+        """Given forces of bonds that are letting go, shape (n_window,)."""
+        return given_forces(self.model, self._ramps, time, self.increment)
+
+    def _hit(
+        self,
+        values: list[TipValues],
+        here: Equilibrium,
+        point: Equilibrium,
+        times: tuple[float, float],
+        *,
+        upward: bool,
+    ) -> float | None:
+        """Fraction of a linear piece at which the largest f of all interfaces crosses 1."""
+        found = [
+            g.crossing(v, here, point, times, upward=upward)
+            for g, v in zip(self.growths, values, strict=True)
+        ]
+        if upward:
+            return min([x for x in found if x is not None], default=None)
+        # all interfaces must be below 1; one without tips does not count
+        waiting = [x for x, v in zip(found, values, strict=True) if len(v.tips)]
+        if not waiting or None in waiting:
+            return None
+        return max(x for x in waiting if x is not None)
+
+    def _advance(self, here: Equilibrium, point: Equilibrium, time: float) -> None:
+        """Move along a linear piece and account for its energy."""
+        self.work += work_between(here, point, len(self.model.loads))
+        self.released += bond_work(here, point)
+        for ramp in self._ramps:
+            index = self.model.components(ramp.p, ramp.nodes)
+            force = here.force[index] + point.force[index]
+            spent = -0.5 * float(force @ (point.jump[index] - here.jump[index]))
+            self._by_force += spent
+            if isinstance(ramp, ViscousRelease):
+                self.viscous += spent
+        self.model.state = point
+        self.time = time
+
+    # -- letting go ----------------------------------------------------------------------
+
+    def _let_go(self, *, all_ready: bool = False) -> None:
+        """Release the critical nodes (or all with f >= 1) at the present load."""
+        for g, v in zip(self.growths, self._values, strict=True):
+            if all_ready:
+                ready = np.flatnonzero(v.f >= g.criterion.window[0])
+            elif v.f.max(initial=0.0) >= max(self._largest()) * (1.0 - 1e-6):
+                ready = g.ready(v)
+            else:
+                continue
+            if not len(ready):
+                continue
+            self._release(g, np.unique(v.tips.force_nodes[ready]), v)
+        self._look()
+        self._record("release")
+
+    def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:
+        """Let nodes of one interface go, at once or with time."""
+        before = self.model.state
+        self._open(g, nodes, values)
+        g.let_go(nodes, values, before, self.time)  # not where a body would come free
+
+    def _open(self, g: Growth, nodes: Ints, values: TipValues) -> None:
+        law = g.debond.release
+        viscosity = getattr(g.criterion, "viscosity", 0.0)
+        if viscosity > 0.0 and not g.opening_driven and isinstance(law, Step):
+            force = bond_forces_of(self.model, g.p, nodes)
+            self._ramps.append(ViscousRelease(g.p, nodes, force, viscosity, self.time))
+            self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
+            self.model.open(g.p, nodes)
+            return
+        if not g.opening_driven and not isinstance(law, Step):
+            now = self.time if law.driver == "time" else float(self.increment)
+            ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)
+            left = [r for r in self._ramps if r.fraction(r.now(self.time, self.increment)) > 0.0]
+            self._ramps[:] = [*left, ramp]
+            self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
+            self.model.open(g.p, nodes)
+            return
+        if g.opening_driven:
+            self.model.soften(g.p, nodes, g.energy_to_spend(nodes, values))
+            return
+        before = self.model.state
+        energy = self.model.release(g.p, nodes, self._force_at(self.time))
+        self.released += energy
+        self._by_force += energy
+        self.work += work_between(before, self.model.state, len(self.model.loads))
+
+    def _look(self) -> None:
+        """Find tips anew, factor again if the window does not hold them, evaluate."""
+        tips = [g.tips() for g in self.growths]
+        if not all(g.held(t) for g, t in zip(self.growths, tips, strict=True)):
+            self.model.rebase()
+            self.model.solve(self._force_at(self.time))
+        self._values = [
+            g.evaluate(t, self.model.state, self.time)
+            for g, t in zip(self.growths, tips, strict=True)
+        ]
+
+    def _evaluate(self) -> list[TipValues]:
+        return [
+            g.evaluate(v.tips, self.model.state, self.time)
+            for g, v in zip(self.growths, self._values, strict=True)
+        ]
+
+    def _largest(self) -> list[float]:
+        return [float(v.f.max(initial=0.0)) for v in self._values] or [0.0]
+
+    # -- ends and rows -------------------------------------------------------------------
+
+    def _ended(self) -> str:
+        for end in self.step.ends:
+            if isinstance(end, Time) and self.time >= end.time * (1.0 - 1e-14):
+                return f"time {end.time:g} reached"
+            if isinstance(end, Releases) and sum(g.n_released for g in self.growths) >= end.count:
+                return f"{end.count} nodes released"
+            if isinstance(end, CrackLength):
+                g = self._growth_of(end)
+                tips = self._values[self.growths.index(g)].tips
+                length = g.extent.length(tips)
+                if length >= end.length * (1.0 - 1e-9):
+                    return f"crack length {end.length:g} of '{g.title}' reached"
+        if self.growths and not any(len(v.tips) for v in self._values):
+            if self._end_time < LARGE and self.time < self._end_time:
+                return ""
+            return "no crack tip is left"
+        return ""
+
+    def _growth_of(self, end: CrackLength) -> Growth:
+        for g in self.growths:
+            if self.model.pairs[g.p].interface is end.interface:
+                return g
+        raise InputError(
+            f"CrackLength names interface '{end.interface.title}', which has no active Debond in "
+            "this step"
+        )
+
+    def _separated(self, error: NotPositiveDefinite) -> str:
+        del error
+        reason = (
+            "total separation: letting the next node go would leave a body held by nothing; "
+            "the step ends in the last equilibrium before it"
+        )
+        log.warn("%s", reason)
+        return reason
+
+    @property
+    def snapped(self) -> float:
+        """Energy lost where softening bonds ran through unstable states."""
+        return self.released - self._by_force - self.model.system.soft.taken(self.model.state.jump)
+
+    def _column_names(self) -> list[tuple[str, str, bool]]:
+        moving = [(c.title, c.moves) for c in self.model.supports.columns]
+        names = [(f"u[{t}]", f"R[{t}]", m) for t, m in moving]
+        return names + [(f"F[{x.title}]", f"v[{x.title}]", True) for x in self.model.loads]
+
+    def _record(self, event: str) -> None:
+        state, model = self.model.state, self.model
+        energy = model.system.strain_energy(state)
+        row: Row = {"time": self.time, "event": event}
+        for (load, answer, moves), a, r in zip(
+            self._names, state.loads, state.conjugate, strict=True
+        ):
+            if moves:
+                row[load] = float(a)
+            row[answer] = float(r)
+        for monitor, value in zip(model.monitors, model.system.monitors(state), strict=True):
+            row[f"m[{monitor.title}]"] = float(value)
+        for g, v in zip(self.growths, self._values, strict=True):
+            row[f"a[{g.title}]"] = g.extent.length(v.tips)
+            row[f"area[{g.title}]"] = g.extent.area(v.tips)
+            row[f"released[{g.title}]"] = g.n_released
+            if len(v.tips):
+                i = v.largest
+                row[f"f[{g.title}]"] = float(v.f[i])
+                for name, quantity in v.report.items():
+                    row[f"{name}[{g.title}]"] = float(quantity[i])
+                row[f"node[{g.title}]"] = int(v.tips.node[i])
+        row["strain_energy"] = energy
+        row["external_work"] = self.work
+        row["released_energy"] = self.released - self.viscous
+        if self.viscous:
+            row["viscous_energy"] = self.viscous
+        if model.system.soft.bonds or model.system.soft.finished:
+            row["snap_energy"] = self.snapped
+        row["balance"] = self.work - energy - self.released
+        self.history.append(row)
+        if self._observer is not None:
+            self._observer(event, row)
