@@ -186,7 +186,7 @@ def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
             result = work()
         except FxcrackError as error:
             problem, cause = str(error), error
-        except Exception as error:
+        except Exception as error:  # whatever it is, the other ranks must hear of it
             problem, cause = f"{type(error).__name__} while making a mesh: {error}", error
     try:
         agree(comm, problem, MeshError)

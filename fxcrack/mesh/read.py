@@ -53,7 +53,7 @@ def read_mesh(
         with gmsh_model(path.stem) as gmsh:
             try:
                 gmsh.merge(str(path))
-            except Exception as error:
+            except Exception as error:  # gmsh raises nothing more special
                 raise MeshError(f"gmsh cannot read '{path}': {error}") from error
             return prepare(gmsh.model, path.stem, gdim, split)
 

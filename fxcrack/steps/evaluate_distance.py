@@ -85,6 +85,7 @@ class _AtDistance:
         return self._known[key]
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
+        """Slave nodes and weights at one tip; each evaluator has its own."""
         raise NotImplementedError
 
     def _check_start(self) -> None:
