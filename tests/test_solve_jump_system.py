@@ -279,3 +279,53 @@ def test_unrestrained_component() -> None:
     assert np.array_equal(system.free, [True, False])
     after = system.equilibrium(np.ones(1), np.zeros(2))
     assert np.array_equal(after.jump, before.jump) and after.jump[0] == -0.5
+
+
+@given(st.integers(0, 2**31), st.integers(2, 6))
+@settings(max_examples=30)
+def test_an_offset_is_a_load_that_is_always_there(seed: int, n_window: int) -> None:
+    rng = np.random.default_rng(seed)
+    whole = Structure.random(n_window, seed).system()
+    n_loads, last = N_SUPPORTS + N_FORCES, n_window + N_SUPPORTS + N_FORCES - 1
+    # the last force pattern, with factor 1, becomes the offset of a system without it
+    keep = np.delete(np.arange(len(whole.schur)), last)
+    part = JumpSystem(
+        whole.schur[np.ix_(keep, keep)],
+        n_window,
+        n_loads - 1,
+        N_FORCES - 1,
+        offset=whole.schur[keep, last],
+    )
+    loads = rng.standard_normal(n_loads)
+    loads[-1] = 1.0
+    force = np.zeros(n_window)
+    for system in (whole, part):
+        system.contact[::2] = True
+        system.release(np.arange(n_window))
+    one, other = whole.equilibrium(loads, force), part.equilibrium(loads[:-1], force)
+    scale = np.abs(one.jump).max()
+    assert other.jump == pytest.approx(one.jump, abs=ROUND_OFF * scale)
+    assert np.array_equal(whole.closed, part.closed)
+    assert part.monitors(other) == pytest.approx(whole.monitors(one), abs=ROUND_OFF * scale)
+    rows = np.arange(n_window)
+    assert part.forces(other, rows) == pytest.approx(whole.forces(one, rows), abs=ROUND_OFF)
+    # closed again and opened once more: the offset is not lost
+    part.hold(np.array([1]))
+    part.release(np.array([1]))
+    again = part.equilibrium(loads[:-1], force)
+    assert again.jump == pytest.approx(one.jump, abs=ROUND_OFF * scale)
+
+
+@given(st.integers(0, 2**31), st.integers(2, 6))
+@settings(max_examples=30)
+def test_rates_are_differences_of_equilibria(seed: int, n_window: int) -> None:
+    rng = np.random.default_rng(seed)
+    system = Structure.random(n_window, seed).system()
+    system.release(np.arange(0, n_window, 2))
+    loads, more = rng.standard_normal((2, N_SUPPORTS + N_FORCES))
+    force, push = rng.standard_normal((2, n_window))
+    a, b = system.linear(loads, force), system.linear(loads + more, force + push)
+    jump, conjugate = system.rates(more, push)
+    scale = np.abs(a.jump).max() + np.abs(b.jump).max()
+    assert b.jump - a.jump == pytest.approx(jump, abs=ROUND_OFF * scale)
+    assert b.conjugate - a.conjugate == pytest.approx(conjugate, abs=ROUND_OFF * scale)

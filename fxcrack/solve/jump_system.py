@@ -7,6 +7,8 @@ known, its jump follows):
 
 a are the prescribed amplitudes and load factors. Contact holds normal components at -gap while
 they press (p_n >= 0) and frees them while they gape (delta_n >= -gap).
+
+A nonlinear continuum is S x + c near its present state (tangent S, offset c).
 """
 
 from __future__ import annotations
@@ -57,6 +59,7 @@ class JumpSystem:
         n_window: Number of window components.
         n_loads: Number of supports and force patterns together.
         n_forces: How many of these are force patterns (the last ones).
+        offset: c, shape (len(schur),); ``None`` for a linear continuum.
 
     Attributes:
         free: Components whose force is known, shape (n_window,).
@@ -67,12 +70,21 @@ class JumpSystem:
         contact_steps: Number of active-set steps done.
     """
 
-    def __init__(self, schur: Array, n_window: int, n_loads: int, n_forces: int) -> None:
+    def __init__(
+        self,
+        schur: Array,
+        n_window: int,
+        n_loads: int,
+        n_forces: int,
+        *,
+        offset: Array | None = None,
+    ) -> None:
         self.schur = schur
+        self.offset = offset
         self.n_window = n_window
         self.load_columns = np.arange(n_window, n_window + n_loads)
-        # rows of S for jumps and loads; slices, so that products need no copies
-        self._by_load = schur[n_window : n_window + n_loads, : n_window + n_loads]
+        # a slice, so that products need no copies
+        self._load_rows = slice(n_window, n_window + n_loads)
         self.monitor_rows = np.arange(n_window + n_loads, len(schur))
         self.sign = np.ones(n_loads)
         self.sign[n_loads - n_forces :] = -1.0
@@ -84,7 +96,8 @@ class JumpSystem:
         self.contact_steps = 0
         self.cholesky = GrowingCholesky(schur)
         self.soft = SoftSet(schur)
-        self._forward = np.zeros((0, n_loads))
+        # the offset is one more load whose factor is 1
+        self._forward = np.zeros((0, n_loads + (offset is not None)))
         self._unit: tuple[Array, Array] | None = None
 
     # -- states --------------------------------------------------------------------------
@@ -100,7 +113,7 @@ class JumpSystem:
             return
         left = self.cholesky.append(new)
         n, k = left.shape[1], len(new)
-        right = self._by_load[:, new].T - left @ self._forward
+        right = self._load_columns_at(new) - left @ self._forward
         tile = self.cholesky._rows[n : n + k, n : n + k]
         self._forward = np.vstack([self._forward, np.linalg.solve(tile, right)])
         if self.soft.bonds:
@@ -149,14 +162,22 @@ class JumpSystem:
         """Hold components again (contact)."""
         self.cholesky.remove(components)
         self.free[components] = False
-        self._forward = self.cholesky.forward(
-            self.schur[np.ix_(self.cholesky.free, self.load_columns)]
-        )
+        self._forward = self.cholesky.forward(self._load_columns_at(self.cholesky.free))
         if self.soft.bonds:
             self.soft.refresh(self.cholesky)
         self._unit = None
 
     # -- equilibrium with given states ---------------------------------------------------
+
+    def _load_columns_at(self, rows: Ints) -> Array:
+        """Forces per load at some components, the offset as a last load, shape (n, n_loads)."""
+        columns = self.schur[np.ix_(rows, self.load_columns)]
+        return columns if self.offset is None else np.column_stack([columns, self.offset[rows]])
+
+    def _product(self, rows: Ints | slice, x: Array) -> Array:
+        """S x + c at some rows, for the leading entries x of all coordinates."""
+        out = self.schur[rows, : len(x)] @ x
+        return np.asarray(out if self.offset is None else out + self.offset[rows])
 
     def _response(self, loads: Array) -> Array:
         """Jumps of the free components under loads alone, shape (n_free,).
@@ -164,6 +185,8 @@ class JumpSystem:
         Loads proportional to the last ones cost no further back-substitution; one with a single
         right-hand side takes a third of the time of one with several.
         """
+        if self.offset is not None:
+            return -self.cholesky.backward(self._forward @ np.append(loads, 1.0))
         if self._unit is not None:
             known, jump = self._unit
             scale = float(known @ loads) / float(known @ known)
@@ -189,15 +212,41 @@ class JumpSystem:
         jump[free] = part
         if self.soft.bonds:
             force = self._add_soft(jump, loads, force)
-        conjugate = self._by_load @ np.concatenate([jump, loads])
+        conjugate = self._product(self._load_rows, np.concatenate([jump, loads]))
         return Equilibrium(loads, force, jump, self.sign * conjugate)
+
+    def rates(self, loads: Array, force: Array) -> tuple[Array, Array]:
+        """Change of jumps and conjugates per change of loads and given forces, states fixed.
+
+        Args:
+            loads: Rates of the loads, shape (n_loads,).
+            force: Rates of the given forces, shape (n_window,).
+
+        Returns:
+            Rates of the jumps, shape (n_window,), and of the conjugates, shape (n_loads,).
+        """
+        free = self.cholesky.free
+        jump = np.zeros(self.n_window)
+        forward = self._forward[:, : len(loads)] @ loads
+        jump[free] = self.cholesky.solve(force[free]) - self.cholesky.backward(forward)
+        if self.soft.bonds:
+            mine = self.soft.components
+            active = np.flatnonzero(jump)
+            right = -self.schur[np.ix_(mine, active)] @ jump[active]
+            right -= self.schur[np.ix_(mine, self.load_columns)] @ loads
+            soft = self.soft.rates(right)
+            jump[free] -= self.cholesky.backward(self.soft.coupling @ soft)
+            jump[mine] = soft
+        x = np.concatenate([jump, loads])
+        return jump, self.sign * (self.schur[self._load_rows, : len(x)] @ x)
 
     def _soft_right(self, jump: Array, loads: Array) -> Array:
         """-g*: minus the forces on the softening components if they did not open."""
         mine = self.soft.components
         active = np.flatnonzero(jump)
         right = -self.schur[np.ix_(mine, active)] @ jump[active]
-        return np.asarray(right - self.schur[np.ix_(mine, self.load_columns)] @ loads)
+        right -= self.schur[np.ix_(mine, self.load_columns)] @ loads
+        return np.asarray(right if self.offset is None else right - self.offset[mine])
 
     def _add_soft(self, jump: Array, loads: Array, force: Array) -> Array:
         """Add the softening jumps and what they open elsewhere; returns all given forces."""
@@ -223,16 +272,14 @@ class JumpSystem:
 
     def forces(self, state: Equilibrium, rows: Ints) -> Array:
         """Interface forces on the slave side at some components, shape (len(rows),)."""
-        x = np.concatenate([state.jump, state.loads])
-        return np.asarray(self.schur[rows, : len(x)] @ x)
+        return self._product(rows, np.concatenate([state.jump, state.loads]))
 
     def monitors(self, state: Equilibrium) -> Array:
         """Monitored displacements, shape (n_monitors,)."""
-        x = np.concatenate([state.jump, state.loads])
-        return np.asarray(self.schur[self.monitor_rows, : len(x)] @ x)
+        return self._product(self.monitor_rows, np.concatenate([state.jump, state.loads]))
 
     def strain_energy(self, state: Equilibrium) -> float:
-        """1/2 u^t K u, as half the work of all forces on their displacements."""
+        """1/2 u^t K u of a linear continuum: half the work of all forces on their displacements."""
         rows = np.flatnonzero((state.jump != 0.0) & (self.closed | (state.force != 0.0)))
         interface = state.jump[rows] @ self.forces(state, rows) if len(rows) else 0.0
         return 0.5 * float(interface + state.loads @ state.conjugate)
@@ -310,6 +357,8 @@ class JumpSystem:
         factor = cho_factor(self.schur[np.ix_(every, every)], lower=True)
         where = np.searchsorted(every, normal)
         right = force[every] - self.schur[np.ix_(every, self.load_columns)] @ loads
+        if self.offset is not None:
+            right -= self.offset[every]
         gap = cho_solve(factor, right)[where] + self.gap[normal]
         unit = np.zeros((len(every), len(normal)))
         unit[where, np.arange(len(normal))] = 1.0

@@ -161,6 +161,11 @@ class SoftSet:
         constant, stiffness = self._laws()
         return np.asarray(np.linalg.solve(self.star - stiffness, constant + right))
 
+    def rates(self, right: Array) -> Array:
+        """Rates of the jumps for given rates of -g*, branches as they are, shape (r,)."""
+        _, stiffness = self._laws()
+        return np.asarray(np.linalg.solve(self.star - stiffness, right))
+
     def forces(self, jump: Array) -> Array:
         """Forces on the slave side at given soft jumps, shape (r,)."""
         constant, stiffness = self._laws()
