@@ -41,6 +41,14 @@ class Continuum:
         model: Kinematic model.
         order: Polynomial order of the displacement, 1 or 2; the order of the mesh by default.
 
+    Attributes:
+        space: Displacement space.
+        x: UFL position.
+        weight: UFL factor of area and volume elements (thickness, ring, 1).
+        degree: Quadrature degree of all integrals.
+        parts: Stiffness on the model's strains, all stresses per strain, and measure, per material.
+        part_materials: The material of each part.
+
     Raises:
         InputError: The model does not fit the mesh, or the materials do not cover it once.
     """
@@ -70,21 +78,23 @@ class Continuum:
         self.n_local = int(index_map.size_local) * self.gdim
         self.n_global = int(index_map.size_global) * self.gdim
         self.offset = int(index_map.local_range[0]) * self.gdim
-        self._x = ufl.SpatialCoordinate(mesh.domain)
-        weight = model.weight(self._x)
-        self._weight = (
+        self.x = ufl.SpatialCoordinate(mesh.domain)
+        weight = model.weight(self.x)
+        self.weight = (
             fem.Constant(mesh.domain, PETSc.ScalarType(weight))
             if isinstance(weight, float)
             else weight
         )
-        self._degree = 2 * self.order + (1 if "Axisymmetric" in type(model).__name__ else 0)
-        self._parts = self._assign(materials)
+        self.degree = 2 * self.order + (1 if "Axisymmetric" in type(model).__name__ else 0)
+        self.part_materials: list[Material] = []
+        self.parts = self._assign(materials)
         self._form: Any = None
 
     def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any, Any]]:
         """Stiffness, stress per strain and measure, one triple per material."""
-        domain, meta = self.mesh.domain, {"quadrature_degree": self._degree}
+        domain, meta = self.mesh.domain, {"quadrature_degree": self.degree}
         if not isinstance(materials, Mapping):
+            self.part_materials = [materials]
             return [(*self._constants(materials), ufl.dx(domain, metadata=meta))]
         n_cells = domain.topology.index_map(self.mesh.tdim).size_local
         count = np.zeros(n_cells, dtype=np.int32)
@@ -102,6 +112,7 @@ class Continuum:
                 f"(given: {', '.join(materials)})"
             )
         agree(self.comm, bad)
+        self.part_materials = list(materials.values())
         entities, tags = np.concatenate(cells), np.concatenate(values)
         sort = np.argsort(entities)
         marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])
@@ -120,9 +131,9 @@ class Continuum:
         """Compile the stiffness form (cached on disk by DOLFINx); assembly does it otherwise."""
         if self._form is None:
             u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
-            eu, ev = self.model.strain(u, self._x), self.model.strain(v, self._x)
+            eu, ev = self.model.strain(u, self.x), self.model.strain(v, self.x)
             self._form = fem.form(
-                sum(ufl.inner(ufl.dot(c, eu), ev) * self._weight * dx for c, _, dx in self._parts)
+                sum(ufl.inner(ufl.dot(c, eu), ev) * self.weight * dx for c, _, dx in self.parts)
             )
 
     def stiffness(self) -> PETSc.Mat:
@@ -135,17 +146,17 @@ class Continuum:
     def load_vector(self, load: Load) -> PETSc.Vec:
         """Nodal forces of a load at amplitude 1; the caller destroys the vector."""
         v = ufl.TestFunction(self.space)
-        meta = {"quadrature_degree": self._degree}
+        meta = {"quadrature_degree": self.degree}
         if isinstance(load, Traction):
             ds = self._surface(load.where, meta)
-            form = ufl.inner(self._vector(load.value, load.title), v) * self._weight * ds
+            form = ufl.inner(self._vector(load.value, load.title), v) * self.weight * ds
         elif isinstance(load, Pressure):
             ds = self._surface(load.where, meta)
             normal = ufl.FacetNormal(self.mesh.domain)
-            form = -ufl.inner(self._field(load.value) * normal, v) * self._weight * ds
+            form = -ufl.inner(self._field(load.value) * normal, v) * self.weight * ds
         elif isinstance(load, BodyForce):
             value = self._vector(load.value, load.title)
-            form = ufl.inner(value, v) * self._weight * self._volume(load.where, meta)
+            form = ufl.inner(value, v) * self.weight * self._volume(load.where, meta)
         else:
             return self._point_force(load.where, load.value, load.title)
         vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
@@ -221,13 +232,13 @@ class Continuum:
         element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
         space = fem.functionspace(self.mesh.domain, element)
         test = ufl.TestFunction(space)
-        strain = self.model.strain(u, self._x)
+        strain = self.model.strain(u, self.x)
         volume = dolfinx.fem.petsc.assemble_vector(
-            fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self._weight * ufl.dx)
+            fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self.weight * ufl.dx)
         )
         sigma = sum(
-            ufl.inner(ufl.dot(recover, strain), test) * self._weight * dx
-            for _, recover, dx in self._parts
+            ufl.inner(ufl.dot(recover, strain), test) * self.weight * dx
+            for _, recover, dx in self.parts
         )
         integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
         out = fem.Function(space, name="stress")

@@ -1,0 +1,65 @@
+"""What every form term has, with the defaults of a conservative one.
+
+A conservative term gives its stored energy W(u) alone; r(u; v) = dW(u; v) and K = d2W follow by
+differentiation. Others give the residual, and the tangent if differentiation cannot find it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+
+Array = npt.NDArray[np.float64]
+
+
+class Term:
+    """One effect in the bodies, as UFL forms.
+
+    Attributes:
+        name: What :meth:`fxcrack.Scene.explain` calls it.
+        symmetric: Whether its tangent is symmetric.
+        constant: Whether its tangent never changes (a linear term).
+    """
+
+    name: str = ""
+    symmetric: bool = True
+    constant: bool = False
+
+    def energy(self, u: fem.Function) -> Any:
+        """Stored energy as a UFL form, ``None`` if it stores none."""
+        return None
+
+    def residual(self, u: fem.Function, v: Any) -> Any:
+        """Internal minus external forces, linear in the test function v; a UFL form."""
+        return ufl.derivative(self.energy(u), u, v)
+
+    def tangent(self, u: fem.Function, v: Any, du: Any) -> Any:
+        """Change of the residual with u in the direction du; a UFL form."""
+        return ufl.derivative(self.residual(u, v), u, du)
+
+    def begin(self, time: float, dt: float) -> None:
+        """An increment of dt ends at a time: set what depends on them; collective."""
+
+    def update(self, u: fem.Function) -> None:
+        """A new trial u was set: update what lives at quadrature points; collective."""
+
+    def commit(self, u: fem.Function) -> None:
+        """The increment is accepted: its end becomes the state the next one starts from."""
+
+    def spent(self) -> dict[str, float]:
+        """Energies turned into something else up to the last commit, by name; collective."""
+        return {}
+
+    def state(self) -> dict[str, Array]:
+        """Committed state of this rank for a checkpoint; empty where there is none."""
+        return {}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state`."""
+
+
+__all__ = ["Term"]

@@ -1,0 +1,148 @@
+"""All form terms of a scene together: residual, tangent and energies at a displacement.
+
+    r(u) = sum of the terms' residuals,    K(u) = sum of their tangents
+
+Dead loads are not in here: they are borders of the condensed system.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import dolfinx.fem.petsc
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fxcrack import compat
+from fxcrack.continuum import Continuum
+from fxcrack.terms.base import Term
+
+Array = npt.NDArray[np.float64]
+
+
+class Bodies:
+    """A continuum made of terms, with its present displacement.
+
+    Args:
+        continuum: Displacement space.
+        terms: What acts in the bodies.
+
+    Attributes:
+        u: Present (trial) displacement.
+        seconds: Seconds spent assembling and updating, by term (``update``) and in all.
+        n_forms: Number of compiled forms.
+    """
+
+    def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
+        self.continuum = continuum
+        self.terms = list(terms)
+        self.u = fem.Function(continuum.space, name="displacement")
+        self.seconds: dict[str, float] = {}
+        self._residual: Any = None
+        self._tangent: Any = None
+        self._energies: dict[str, Any] = {}
+        self._matrix: PETSc.Mat | None = None
+        self._assembled = False
+
+    @property
+    def n_forms(self) -> int:
+        """Number of compiled forms."""
+        return (2 if self._residual is not None else 0) + len(self._energies)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether the tangent is symmetric."""
+        return all(t.symmetric for t in self.terms)
+
+    @property
+    def constant(self) -> bool:
+        """Whether the tangent never changes."""
+        return all(t.constant for t in self.terms)
+
+    def compile(self) -> None:
+        """Compile all forms; collective."""
+        if self._residual is not None:
+            return
+        space = self.continuum.space
+        v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+        self._residual = fem.form(sum(t.residual(self.u, v) for t in self.terms))
+        self._tangent = fem.form(sum(t.tangent(self.u, v, du) for t in self.terms))
+        for term in self.terms:
+            energy = term.energy(self.u)
+            if energy is not None:
+                self._energies[term.name] = fem.form(energy)
+
+    def set(self, u: PETSc.Vec) -> None:
+        """Take a trial displacement (owned dofs) and update the terms; collective."""
+        n = self.continuum.n_local
+        self.u.x.array[:n] = u.array
+        self.u.x.scatter_forward()
+        for term in self.terms:
+            start = time.perf_counter()
+            term.update(self.u)
+            self._add(term.name, start)
+
+    def _add(self, what: str, start: float) -> None:
+        self.seconds[what] = self.seconds.get(what, 0.0) + time.perf_counter() - start
+
+    def residual(self) -> PETSc.Vec:
+        """R(u) on owned dofs; the caller destroys it."""
+        start = time.perf_counter()
+        self.compile()
+        vector = compat.create_vector(self._residual)
+        dolfinx.fem.petsc.assemble_vector(vector, self._residual)
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        self._add("residual", start)
+        return vector
+
+    def tangent(self) -> PETSc.Mat:
+        """K(u), kept and reassembled in place; owned by this object."""
+        start = time.perf_counter()
+        self.compile()
+        if self._matrix is None:
+            self._matrix = dolfinx.fem.petsc.create_matrix(self._tangent)
+        if not (self.constant and self._assembled):
+            self._matrix.zeroEntries()
+            dolfinx.fem.petsc.assemble_matrix(self._matrix, self._tangent)
+            self._matrix.assemble()
+            self._assembled = True
+        self._add("tangent", start)
+        return self._matrix
+
+    def stored(self) -> dict[str, float]:
+        """Stored energies by term; collective."""
+        comm = self.continuum.comm
+        return {
+            name: float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
+            for name, form in self._energies.items()
+        }
+
+    def spent(self) -> dict[str, float]:
+        """Energies turned into something else so far, by name; collective."""
+        out: dict[str, float] = {}
+        for term in self.terms:
+            for name, value in term.spent().items():
+                out[name] = out.get(name, 0.0) + value
+        return out
+
+    def begin(self, time_end: float, dt: float) -> None:
+        """An increment of dt ends at a time; collective."""
+        for term in self.terms:
+            term.begin(time_end, dt)
+
+    def commit(self) -> None:
+        """Accept the present displacement."""
+        for term in self.terms:
+            term.commit(self.u)
+
+    def destroy(self) -> None:
+        """Free PETSc objects; collective."""
+        if self._matrix is not None:
+            self._matrix.destroy()
+            self._matrix = None
