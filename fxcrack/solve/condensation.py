@@ -294,6 +294,22 @@ class Condensation:
             u on the displacement dofs; the caller destroys it.
         """
         start = time.perf_counter()
+        q = self.expanded(last)
+        u = self.coordinates.transform.createVecLeft()
+        self.coordinates.transform.mult(q, u)
+        q.destroy()
+        self.timings.add("fields", start)
+        return u
+
+    def expanded(self, last: Array) -> PETSc.Vec:
+        """Coordinates q for given last ones, q_1 = -A_11^-1 A_12 x; collective.
+
+        Args:
+            last: x, shape (n_last,).
+
+        Returns:
+            q in the numbering of T's columns; the caller destroys it.
+        """
         n_inner = self.coordinates.n_inner
         q = self.matrix.createVecRight()
         if self._comm.rank == 0:
@@ -301,6 +317,37 @@ class Condensation:
         right = self.matrix.createVecLeft()
         self.matrix.mult(q, right)
         right.scale(-1.0)
+        self._solve_inner(right, q)
+        right.destroy()
+        return q
+
+    def reduced(self, residual: PETSc.Vec) -> tuple[Array, PETSc.Vec]:
+        """Forces r on the bodies condensed as K is: r_2 - A_21 A_11^-1 r_1; collective.
+
+        Args:
+            residual: r on the displacement dofs; stays with the caller.
+
+        Returns:
+            The condensed forces, shape (n_last,) on every rank, and A_11^-1 r_1 with zeros behind
+            it, which the caller destroys.
+        """
+        n_inner = self.coordinates.n_inner
+        right = self.matrix.createVecLeft()
+        self.coordinates.transform.multTranspose(residual, right)
+        direct = right.array[n_inner:].copy()
+        q = self.matrix.createVecRight()
+        self._solve_inner(right, q)
+        self.matrix.mult(q, right)
+        out = np.zeros(self.coordinates.n_last)
+        if self._comm.rank == 0:
+            out[:] = direct - right.array[n_inner:]
+        right.destroy()
+        self._comm.Bcast(out)
+        return out, q
+
+    def _solve_inner(self, right: PETSc.Vec, q: PETSc.Vec) -> None:
+        """Set q_1 = A_11^-1 right_1; the last entries of ``right`` are overwritten."""
+        n_inner = self.coordinates.n_inner
         if self._factor is not None and self._factor.solves:
             right.array[n_inner:] = 0.0
             solution = right.duplicate()
@@ -316,15 +363,9 @@ class Condensation:
             q.array[:n_inner] = found.array
             inner.destroy()
             found.destroy()
-        u = self.coordinates.transform.createVecLeft()
-        self.coordinates.transform.mult(q, u)
-        q.destroy()
-        right.destroy()
-        self.timings.add("fields", start)
-        return u
 
-    def destroy(self) -> None:
-        """Free matrices and factors; collective."""
+    def destroy(self, *, keep_transform: bool = False) -> None:
+        """Free matrices and factors, and T unless it is to be used again; collective."""
         if self._factor is not None:
             self._factor.destroy()
         if self._inner is not None:
@@ -332,4 +373,5 @@ class Condensation:
         if self._inner_matrix is not None:
             self._inner_matrix.destroy()
         self.matrix.destroy()
-        self.coordinates.transform.destroy()
+        if not keep_transform:
+            self.coordinates.transform.destroy()

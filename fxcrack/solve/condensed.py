@@ -19,7 +19,7 @@ from fxcrack import log
 from fxcrack.continuum import Continuum
 from fxcrack.errors import SolverError
 from fxcrack.interface.front import Front, Tips
-from fxcrack.interface.jumps import WINDOW, build_coordinates
+from fxcrack.interface.jumps import WINDOW, JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.loads import Load, Monitor
@@ -122,15 +122,37 @@ class CondensedModel:
         self.rebases = 0
 
     def _rebase(self) -> None:
-        if self._stiffness is None:
-            start = time.perf_counter()
-            check_held(self.continuum, self.supports)
-            self.continuum.compile()
-            self.timings.add("compile", start)
-            start = time.perf_counter()
-            self._stiffness = self.continuum.stiffness()
-            self._borders = border_vectors(self.continuum, self.loads, self.monitors)
-            self.timings.add("assemble", start)
+        self._assemble()
+        coordinates = self._choose_window()
+        self.frames, self.index = coordinates.frames, coordinates.index
+        self.held_by_supports = coordinates.held
+        for front, held in zip(self.fronts, coordinates.held, strict=True):
+            front.tied = held.all(axis=1)
+        self._condense(coordinates)
+        start = time.perf_counter()
+        self._restore_states()
+        self.timings.add("march", start)
+        log.info(
+            "factorisation %d: %d coordinates in the window",
+            self.timings.factorizations,
+            coordinates.n_window,
+        )
+
+    def _assemble(self) -> None:
+        """Make K and the borders on first use; collective."""
+        if self._stiffness is not None:
+            return
+        start = time.perf_counter()
+        check_held(self.continuum, self.supports)
+        self.continuum.compile()
+        self.timings.add("compile", start)
+        start = time.perf_counter()
+        self._stiffness = self.continuum.stiffness()
+        self._borders = border_vectors(self.continuum, self.loads, self.monitors)
+        self.timings.add("assemble", start)
+
+    def _choose_window(self) -> JumpCoordinates:
+        """Coordinates around the present fronts; collective."""
         reach = self.reach
         if self.options.rows is not None:
             reach = [min(r, self.options.rows) for r in reach]
@@ -147,11 +169,17 @@ class CondensedModel:
         )
         if self._condensation is not None:
             self._condensation.destroy()
+            self._condensation = None
         start = time.perf_counter()
         coordinates = build_coordinates(
             self.continuum, self.pairs, roles, self.supports, len(self._borders)
         )
         self.timings.add("transform", start)
+        return coordinates
+
+    def _condense(self, coordinates: JumpCoordinates) -> None:
+        """Factor, and set up the dense system of the window; collective."""
+        assert self._stiffness is not None
         start = time.perf_counter()
         self._condensation = Condensation(
             self._stiffness,
@@ -162,22 +190,10 @@ class CondensedModel:
         )
         seconds = self.continuum.comm.bcast(time.perf_counter() - start)
         self._cost.observe(coordinates.n_window, seconds)
-        self.frames, self.index = coordinates.frames, coordinates.index
-        self.held_by_supports = coordinates.held
-        for front, held in zip(self.fronts, coordinates.held, strict=True):
-            front.tied = held.all(axis=1)
         self.system = JumpSystem(
             self._condensation.schur, coordinates.n_window, self.n_loads, len(self.loads)
         )
         self._face_loads = -self._condensation.borders_on_window[:, : len(self.loads)]
-        start = time.perf_counter()
-        self._restore_states()
-        self.timings.add("march", start)
-        log.info(
-            "factorisation %d: %d coordinates in the window",
-            self.timings.factorizations,
-            coordinates.n_window,
-        )
 
     def _restore_states(self) -> None:
         """Free what is open in the new window, soften what softens, mark what may touch."""

@@ -22,7 +22,7 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import nnls
 
 from fxcrack.errors import ConvergenceError
-from fxcrack.solve.cholesky import GrowingCholesky
+from fxcrack.solve.cholesky import GrowingCholesky, NotPositiveDefinite
 from fxcrack.solve.softening import SoftBond, SoftSet
 
 Array = npt.NDArray[np.float64]
@@ -99,6 +99,29 @@ class JumpSystem:
         # the offset is one more load whose factor is 1
         self._forward = np.zeros((0, n_loads + (offset is not None)))
         self._unit: tuple[Array, Array] | None = None
+
+    def renew(self, schur: Array, offset: Array) -> None:
+        """Take the tangent at another state of the continuum; the states stay as they are.
+
+        Raises:
+            NotPositiveDefinite: The free components have no stable equilibrium with it.
+        """
+        free, bonds, old = self.cholesky.free, self.soft.bonds, (self.schur, self.offset)
+        try:
+            self._take(schur, offset, free, bonds)
+        except NotPositiveDefinite:
+            self._take(*old, free, bonds)
+            raise
+
+    def _take(self, schur: Array, offset: Array | None, free: Ints, bonds: list[SoftBond]) -> None:
+        self.schur, self.offset = schur, offset
+        self.cholesky = GrowingCholesky(schur)
+        self._forward = np.zeros((0, len(self.load_columns) + (offset is not None)))
+        self._unit = None
+        self.soft.bonds = []
+        self.free[:] = False
+        self.release(free)
+        self.soft.renew(schur, bonds, self.cholesky)
 
     # -- states --------------------------------------------------------------------------
 

@@ -114,6 +114,11 @@ class SoftSet:
         self._forward = cholesky.forward(self._schur[np.ix_(cholesky.free, mine)])
         self._star = None
 
+    def renew(self, schur: Array, bonds: list[SoftBond], cholesky: GrowingCholesky) -> None:
+        """Take another S with the same numbering, and the bonds."""
+        self._schur, self.bonds = schur, bonds
+        self.refresh(cholesky)
+
     def extend(self, new: Ints, left: Array, tile: Array) -> None:
         """Follow the free set as it grows.
 
