@@ -34,6 +34,7 @@ from fxcrack.loads import (
 from fxcrack.materials import Isotropic, Orthotropic
 from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
 from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.nonlinear_materials import NeoHookean
 from fxcrack.output import plots
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.history import History
@@ -73,6 +74,7 @@ __all__ = [
     "Isotropic",
     "Mesh",
     "Monitor",
+    "NeoHookean",
     "OpeningRamp",
     "Orthotropic",
     "Paris",

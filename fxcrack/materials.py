@@ -31,17 +31,23 @@ class Isotropic:
     Args:
         E: Young's modulus, force/length^2.
         nu: Poisson's ratio, -1 < nu < 0.5.
+        expansion: Thermal strain per degree, 1/temperature.
+        density: Mass per volume; ``None`` where inertia plays no part.
     """
 
     E: float
     nu: float
+    expansion: float = 0.0
+    density: float | None = None
 
     def __post_init__(self) -> None:
         """Check the constants."""
+        name = type(self).__name__
         if not (np.isfinite(self.E) and self.E > 0.0):
-            raise InputError(f"Isotropic: E = {self.E} must be positive")
+            raise InputError(f"{name}: E = {self.E} must be positive")
         if not -1.0 < self.nu < 0.5:
-            raise InputError(f"Isotropic: nu = {self.nu} must lie between -1 and 0.5 (exclusive)")
+            raise InputError(f"{name}: nu = {self.nu} must lie between -1 and 0.5 (exclusive)")
+        _check_common(name, self.expansion, self.density)
 
     def stiffness(self) -> Array:
         """Stiffness, shape (6, 6)."""
@@ -52,6 +58,10 @@ class Isotropic:
         c[np.arange(3), np.arange(3)] += 2.0 * shear
         c[np.arange(3, 6), np.arange(3, 6)] = shear
         return c
+
+    def thermal_expansion(self) -> Array:
+        """Thermal strain per degree, shape (6,), 1/temperature."""
+        return self.expansion * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -64,6 +74,8 @@ class Orthotropic:
         G: Shear moduli (G12, G13, G23), force/length^2.
         frame: Two global direction vectors, of axis 1 and of one in the plane of axes 1 and 2;
             the default puts axes 1, 2, 3 along x, y, z.
+        expansion: Thermal strains per degree along axes 1, 2, 3, 1/temperature.
+        density: Mass per volume; ``None`` where inertia plays no part.
     """
 
     E: tuple[float, float, float]
@@ -73,6 +85,8 @@ class Orthotropic:
         (1.0, 0.0, 0.0),
         (0.0, 1.0, 0.0),
     )
+    expansion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    density: float | None = None
 
     def __post_init__(self) -> None:
         """Check the constants and the frame."""
@@ -88,6 +102,11 @@ class Orthotropic:
             float(np.linalg.norm(in_plane)), 1e-300
         ):
             raise InputError(f"Orthotropic: the two vectors of frame = {self.frame} are parallel")
+        if np.shape(self.expansion) != (3,):
+            raise InputError(
+                f"Orthotropic: expansion = {self.expansion} must be three numbers, one per axis"
+            )
+        _check_common("Orthotropic", self.expansion, self.density)
 
     def _compliance(self) -> Array:
         e1, e2, e3 = self.E
@@ -104,13 +123,28 @@ class Orthotropic:
 
     def stiffness(self) -> Array:
         """Stiffness in global axes, shape (6, 6)."""
-        local = np.linalg.inv(self._compliance())
+        to_local = self._to_local()
+        return np.asarray(to_local.T @ np.linalg.inv(self._compliance()) @ to_local)
+
+    def thermal_expansion(self) -> Array:
+        """Thermal strain per degree in global axes, shape (6,), 1/temperature."""
+        local = np.array([*self.expansion, 0.0, 0.0, 0.0])
+        return np.asarray(np.linalg.solve(self._to_local(), local))
+
+    def _to_local(self) -> Array:
+        """Takes a strain from global axes to the frame, shape (6, 6)."""
         e1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
         e1 = e1 / np.linalg.norm(e1)
         e3 = np.cross(e1, in_plane)
         e3 /= np.linalg.norm(e3)
-        to_local = strain_rotation(np.vstack([e1, np.cross(e3, e1), e3]))
-        return np.asarray(to_local.T @ local @ to_local)
+        return strain_rotation(np.vstack([e1, np.cross(e3, e1), e3]))
+
+
+def _check_common(name: str, expansion: float | tuple[float, ...], density: float | None) -> None:
+    if not np.all(np.isfinite(expansion)):
+        raise InputError(f"{name}: expansion = {expansion} must be finite")
+    if density is not None and not (np.isfinite(density) and density > 0.0):
+        raise InputError(f"{name}: density = {density} must be positive; leave it out for none")
 
 
 def strain_rotation(axes: Array) -> Array:

@@ -1,7 +1,8 @@
 """What every form term has, with the defaults of a conservative one.
 
 A conservative term gives its stored energy W(u) alone; r(u; v) = dW(u; v) and K = d2W follow by
-differentiation. Others give the residual, and the tangent if differentiation cannot find it.
+differentiation. Others give the residual, and the tangent if differentiation cannot find it; their
+energy may then be any form that has the stored energy as its value.
 """
 
 from __future__ import annotations
@@ -13,6 +14,8 @@ import numpy.typing as npt
 import ufl
 from dolfinx import fem
 
+from fxcrack.continuum import Continuum
+
 Array = npt.NDArray[np.float64]
 
 
@@ -22,12 +25,17 @@ class Term:
     Attributes:
         name: What :meth:`fxcrack.Scene.explain` calls it.
         symmetric: Whether its tangent is symmetric.
-        constant: Whether its tangent never changes (a linear term).
+        constant: Whether its tangent does not depend on u (a linear term).
+        version: Counts the changes of a constant tangent by :meth:`begin` (another dt or
+            temperature): the same number, the same tangent.
+        energy_name: What the balance calls its stored energy; terms of one name are summed.
     """
 
     name: str = ""
     symmetric: bool = True
     constant: bool = False
+    version: int = 0
+    energy_name: str = "strain_energy"
 
     def energy(self, u: fem.Function) -> Any:
         """Stored energy as a UFL form, ``None`` if it stores none."""
@@ -54,6 +62,14 @@ class Term:
         """Energies turned into something else up to the last commit, by name; collective."""
         return {}
 
+    def work(self) -> float:
+        """Work done on the bodies through the term up to the last commit; collective.
+
+        That of loads that follow the bodies, and of a temperature; supports and dead loads do
+        theirs elsewhere.
+        """
+        return 0.0
+
     def state(self) -> dict[str, Array]:
         """Committed state of this rank for a checkpoint; empty where there is none."""
         return {}
@@ -62,4 +78,10 @@ class Term:
         """Set the committed state from :meth:`state`."""
 
 
-__all__ = ["Term"]
+def parts_of(continuum: Continuum, form: str) -> list[int]:
+    """Parts of a continuum whose material names a form of its own, or "elastic" for the others."""
+    forms = [getattr(m, "form", "elastic") for m in continuum.part_materials]
+    return [i for i, f in enumerate(forms) if f == form]
+
+
+__all__ = ["Term", "parts_of"]

@@ -48,7 +48,7 @@ class Bodies:
         self._tangent: Any = None
         self._energies: dict[str, Any] = {}
         self._matrix: PETSc.Mat | None = None
-        self._assembled = False
+        self._assembled: tuple[int, ...] | None = None  # version of the terms in the matrix
 
     @property
     def n_forms(self) -> int:
@@ -62,8 +62,13 @@ class Bodies:
 
     @property
     def constant(self) -> bool:
-        """Whether the tangent never changes."""
+        """Whether the tangent does not depend on u."""
         return all(t.constant for t in self.terms)
+
+    @property
+    def version(self) -> tuple[int, ...]:
+        """Tells constant tangents apart: equal versions, equal tangents."""
+        return tuple(t.version for t in self.terms)
 
     def compile(self) -> None:
         """Compile all forms; collective."""
@@ -73,10 +78,12 @@ class Bodies:
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
         self._residual = fem.form(sum(t.residual(self.u, v) for t in self.terms))
         self._tangent = fem.form(sum(t.tangent(self.u, v, du) for t in self.terms))
+        energies: dict[str, Any] = {}
         for term in self.terms:
             energy = term.energy(self.u)
             if energy is not None:
-                self._energies[term.name] = fem.form(energy)
+                energies[term.energy_name] = energies.get(term.energy_name, 0) + energy
+        self._energies = {name: fem.form(energy) for name, energy in energies.items()}
 
     def set(self, u: PETSc.Vec) -> None:
         """Take a trial displacement (owned dofs) and update the terms; collective."""
@@ -107,16 +114,17 @@ class Bodies:
         self.compile()
         if self._matrix is None:
             self._matrix = dolfinx.fem.petsc.create_matrix(self._tangent)
-        if not (self.constant and self._assembled):
+        if not (self.constant and self._assembled == self.version):
             self._matrix.zeroEntries()
             dolfinx.fem.petsc.assemble_matrix(self._matrix, self._tangent)
             self._matrix.assemble()
-            self._assembled = True
+            self._assembled = self.version
         self._add("tangent", start)
         return self._matrix
 
     def stored(self) -> dict[str, float]:
-        """Stored energies by term; collective."""
+        """Energies stored at the present displacement, by name; collective."""
+        self.compile()
         comm = self.continuum.comm
         return {
             name: float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
@@ -131,6 +139,10 @@ class Bodies:
                 out[name] = out.get(name, 0.0) + value
         return out
 
+    def work(self) -> float:
+        """Work done on the bodies through the terms up to the last commit; collective."""
+        return sum(term.work() for term in self.terms)
+
     def begin(self, time_end: float, dt: float) -> None:
         """An increment of dt ends at a time; collective."""
         for term in self.terms:
@@ -139,7 +151,9 @@ class Bodies:
     def commit(self) -> None:
         """Accept the present displacement."""
         for term in self.terms:
+            start = time.perf_counter()
             term.commit(self.u)
+            self._add(term.name, start)
 
     def destroy(self) -> None:
         """Free PETSc objects; collective."""
