@@ -36,9 +36,10 @@ from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
 from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
 from fxcrack.nonlinear_materials import NeoHookean
 from fxcrack.output import plots
+from fxcrack.output.bonds import BondHistory, bond_table, write_releases
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.history import History
-from fxcrack.output.report import tip_table, write_releases, write_tip_table
+from fxcrack.output.report import tip_table, write_tip_table
 from fxcrack.scene import Debond, Scene
 from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.steps.fatigue import Cycles
@@ -56,6 +57,7 @@ __all__ = [
     "AmplitudeRelease",
     "Axisymmetric",
     "BodyForce",
+    "BondHistory",
     "CondensedOptions",
     "CrackLength",
     "CrackLengthVsTime",
@@ -95,6 +97,7 @@ __all__ = [
     "Tabulated",
     "Time",
     "Traction",
+    "bond_table",
     "compat",
     "displacement_function",
     "mesh_from_gmsh",

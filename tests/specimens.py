@@ -24,6 +24,11 @@ PINS = (
     fx.Displacement("pin_top", x=0.0, y=1.0),
     fx.Displacement("pin_bottom", x=0.0, y=-1.0),
 )
+FORCES = (fx.PointForce("pin_top", (0.0, 1.0)), fx.PointForce("pin_bottom", (0.0, -1.0)))
+HELD_FAR = (
+    fx.Displacement("far_upper", x=0.0, y=0.0),
+    fx.Displacement("far_lower", x=0.0, y=0.0),
+)
 CLAMPED_3D = (
     fx.Displacement("far_upper", x=0.0, y=0.0, z=0.0),
     fx.Displacement("far_lower", x=0.0, y=0.0, z=0.0),
@@ -47,7 +52,9 @@ def specimen(
     mesh: fx.Mesh,
     *,
     a0: float = 30.0,
-    criterion: fx.VCCT | None = None,
+    criterion: Any = None,
+    release: Any = None,
+    temperature: Any = None,
     model: Any = None,
     materials: Any = STEEL,
     supports: Sequence[fx.Displacement] | None = None,
@@ -60,12 +67,18 @@ def specimen(
         supports = PINS if mesh.gdim == 2 else CLAMPED_3D
     if model is None:
         model = fx.PlaneStrain() if mesh.gdim == 2 else fx.Solid()
+    debond = fx.Debond(
+        interface or bond(a0, contact=contact),
+        criterion or fx.VCCT(GIc=0.2),
+        release or fx.Step(),
+        temperature=temperature,
+    )
     return fx.Scene(
         mesh,
         materials=materials,
         model=model,
         supports=supports,
-        debonds=[fx.Debond(interface or bond(a0, contact=contact), criterion or fx.VCCT(GIc=0.2))],
+        debonds=[debond],
         **scene,
     )
 

@@ -12,6 +12,8 @@ import scipy.sparse as sp
 import scipy.sparse.linalg
 from mpi4py import MPI
 from specimens import (
+    FORCES,
+    HELD_FAR,
     PINS,
     assert_same,
     column,
@@ -37,11 +39,6 @@ SAME = 1e-8  # of the largest value: what other ranks, windows or programs may d
 BALANCE = 1e-9  # of the work: round-off of the condensation
 CARBON = fx.Orthotropic(
     E=(139.4e3, 10.16e3, 10.16e3), nu=(0.30, 0.30, 0.436), G=(4.6e3, 4.6e3, 3.54e3)
-)
-FORCES = (fx.PointForce("pin_top", (0.0, 1.0)), fx.PointForce("pin_bottom", (0.0, -1.0)))
-HELD_FAR = (
-    fx.Displacement("far_upper", x=0.0, y=0.0),
-    fx.Displacement("far_lower", x=0.0, y=0.0),
 )
 
 

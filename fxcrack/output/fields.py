@@ -90,6 +90,12 @@ def interface_grid(pair: Pair, fields: InterfaceFields) -> Grid:
             "front": fields.front,
             "release_time": fields.release_time,
             **fields.at_front,
+            **fields.bonds,
+        },
+        components={
+            name: [f"{name}1{i}" for i in (1, 2, 3)]
+            for name, values in fields.bonds.items()
+            if values.ndim == 2
         },
     )
 

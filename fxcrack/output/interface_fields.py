@@ -50,6 +50,8 @@ class InterfaceFields:
             it is bonded, shape (n_nodes,).
         at_front: What the criterion says at the front nodes, 0 elsewhere, each of shape (n_nodes,):
             f, and what is behind it, as GI, GII, GIII and their sum G (force/length).
+        bonds: The bonds under the usual output names, see
+            :func:`~fxcrack.steps.records.bond_state`; empty where no criterion is given.
     """
 
     displacement: Array
@@ -60,6 +62,7 @@ class InterfaceFields:
     front: npt.NDArray[np.int32]
     release_time: Array
     at_front: dict[str, Array]
+    bonds: dict[str, Array]
 
 
 def residual(scene: Scene, u: fem.Function) -> Array:
@@ -160,15 +163,17 @@ def _fields_of(
     front = np.zeros(surface.n_nodes, dtype=np.int32)
     when = np.where(bonded, np.nan, 0.0)
     at_front: dict[str, Array] = {}
+    bonds: dict[str, Array] = {}
     for growth in scene.growths:
         if growth.p == p:
             tips = growth.tips()
             front[tips.node] = 1
-            at_front |= bond_state(growth, scene.ramps, time)
             for node, moment in growth.released:
                 when[node] = moment
-            if model.active[p]:
-                at_front |= _at_front(growth.evaluate(tips, model.state, time), surface.n_nodes)
+            values = growth.evaluate(tips, model.state, time) if model.active[p] else None
+            bonds = bond_state(growth, scene.ramps, values)
+            if values is not None:
+                at_front = _at_front(values, surface.n_nodes)
     return InterfaceFields(
         displacement=in_space(slave),
         opening=in_space(opening),
@@ -178,6 +183,7 @@ def _fields_of(
         front=front,
         release_time=when,
         at_front=at_front,
+        bonds=bonds,
     )
 
 
