@@ -5,13 +5,12 @@ tangent); arrays have one row per front node.
 """
 
 from fxcrack.criteria.closure import closure_rates
-from fxcrack.criteria.cod import CrackOpening, opening_behind
-from fxcrack.criteria.crack_length import CrackLengthVsTime, length_to_tip
+from fxcrack.criteria.cod import CrackOpening
+from fxcrack.criteria.crack_length import CrackLengthVsTime
 from fxcrack.criteria.critical_stress import CriticalStress
-from fxcrack.criteria.enhanced import EnhancedVCCT, dissipated, secant_fraction
+from fxcrack.criteria.enhanced import EnhancedVCCT
 from fxcrack.criteria.fatigue import CycleJump, Fatigue, Paris, Regime, cycle_jump
 from fxcrack.criteria.mixed_mode import BK, MixedMode, Power, Reeder, clip, total
-from fxcrack.criteria.path import at_distance
 from fxcrack.criteria.rate_criterion import RateCriterion
 from fxcrack.criteria.release import (
     AmplitudeRelease,
@@ -19,11 +18,6 @@ from fxcrack.criteria.release import (
     Ramp,
     Release,
     Step,
-    final_opening,
-    linear_fraction,
-    spent_fraction,
-    viscous_damage,
-    viscous_work,
 )
 from fxcrack.criteria.toughness import Property, Tabulated
 from fxcrack.criteria.vcct import VCCT, energy_release_rates
@@ -50,19 +44,9 @@ __all__ = [
     "Release",
     "Step",
     "Tabulated",
-    "at_distance",
     "clip",
     "closure_rates",
     "cycle_jump",
-    "dissipated",
     "energy_release_rates",
-    "final_opening",
-    "length_to_tip",
-    "linear_fraction",
-    "opening_behind",
-    "secant_fraction",
-    "spent_fraction",
     "total",
-    "viscous_damage",
-    "viscous_work",
 ]

@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.criteria.checks import Array
-from fxcrack.criteria.release import linear_fraction
 from fxcrack.criteria.toughness import Property, Tabulated
 from fxcrack.criteria.vcct import VCCT
 from fxcrack.errors import InputError
@@ -79,38 +78,3 @@ class EnhancedVCCT(VCCT):
             temperature,
             n_slave,
         )
-
-
-def secant_fraction(opening: npt.ArrayLike, largest: npt.ArrayLike, final: npt.ArrayLike) -> Array:
-    """Fraction of the force at onset that acts at an opening, with secant unloading.
-
-    Args:
-        opening: Opening along the direction of the force at onset, shape (n,) [length].
-        largest: Largest opening so far, shape (n,) [length].
-        final: Opening at which nothing remains, see
-            :func:`~fxcrack.criteria.release.final_opening`, shape (n,) or one number [length].
-
-    Returns:
-        Fractions between 0 and 1, shape (n,): 1 - w/w_f while the opening grows, on the line to the
-        origin below the largest opening, 0 when closed again.
-    """
-    w = np.maximum(np.asarray(opening, dtype=np.float64), 0.0)
-    top = np.maximum(np.asarray(largest, dtype=np.float64), w)
-    top, w = np.broadcast_arrays(top, w)
-    way = np.divide(w, top, out=np.ones(np.shape(top)), where=top > 0.0)
-    return linear_fraction(top, final) * way
-
-
-def dissipated(force: npt.ArrayLike, largest: npt.ArrayLike, final: npt.ArrayLike) -> Array:
-    """Energy lost for good, the triangle between softening and secant, 1/2 |F0| min(w, w_f).
-
-    Args:
-        force: Size |F0| of the bond force at onset, shape (n,) [force].
-        largest: Largest opening so far, shape (n,) [length].
-        final: Opening at which nothing remains, shape (n,) or one number [length].
-
-    Returns:
-        Energy, shape (n,) [force length]; G_equivC^P dA once the node is free.
-    """
-    w = np.minimum(np.maximum(np.asarray(largest, dtype=np.float64), 0.0), final)
-    return np.asarray(0.5 * np.asarray(force, dtype=np.float64) * w)

@@ -53,34 +53,6 @@ def locate(owner: str, points: npt.ArrayLike, distance: float, order: int) -> tu
     return rows, _weights(_solve(x[rows] - x[0], min(distance, reach), order), order)
 
 
-def at_distance(s: npt.ArrayLike, values: npt.ArrayLike, distance: float, order: int) -> Array:
-    """Values at a distance along a polyline of face nodes, interpolated by the order of the faces.
-
-    Args:
-        s: Distance of each node from the tip along the surface, increasing, ``s[0]`` at the tip,
-            shape (m,) [length].
-        values: Values at the nodes, shape (m, k) or (m,).
-        distance: Where the value is wanted, from ``s[0]`` on [length].
-        order: Order of the faces, 1 or 2 (corner, midside, corner, ...).
-
-    Returns:
-        Values there, shape (k,) or ().
-
-    Raises:
-        InputError: ``distance`` lies outside the path, or ``s`` does not increase.
-    """
-    along = np.asarray(s, dtype=np.float64)
-    nodal = np.asarray(values, dtype=np.float64)
-    if along.ndim != 1 or nodal.shape[:1] != along.shape:
-        raise InputError(
-            f"at_distance: {nodal.shape} values for {along.shape} distances; give one row per node"
-        )
-    if not (np.diff(along) > 0.0).all():
-        raise InputError("at_distance: the distances of the nodes from the tip must increase")
-    rows, weights = locate("at_distance", along[:, None], distance, order)
-    return np.asarray(weights @ nodal[rows])
-
-
 def _weights(xi: float, order: int) -> Array:
     """Lagrange shape functions on [-1, 1], nodes in the order of the path."""
     if order == 1:

@@ -28,41 +28,10 @@ from fxcrack.errors import InputError
 Driver = Literal["increments", "time", "opening"]
 
 
-def final_opening(force: npt.ArrayLike, toughness: npt.ArrayLike, area: npt.ArrayLike) -> Array:
-    """Opening at which a linearly falling force has spent the toughness, w_f = 2 G A/|F0|.
-
-    Args:
-        force: Bond forces at debonding, shape (n, dim) [force].
-        toughness: Energy per area to spend, shape (n,) or one number [force/length].
-        area: Area the node stands for, shape (n,) or one number [length^2].
-
-    Returns:
-        Final openings along the direction of the force, shape (n,) [length]; infinite for no force.
-    """
-    size = np.linalg.norm(np.asarray(force, dtype=np.float64), axis=-1)
-    energy = 2.0 * np.asarray(toughness, dtype=np.float64) * np.asarray(area, dtype=np.float64)
-    energy = np.broadcast_to(energy, size.shape)
-    return np.asarray(np.divide(energy, size, out=np.full(size.shape, np.inf), where=size > 0.0))
-
-
-def linear_fraction(largest: npt.ArrayLike, final: npt.ArrayLike) -> Array:
-    """Remaining fraction 1 - w/w_f at the largest opening so far, between 1 and 0.
-
-    Args:
-        largest: Largest opening so far, shape (n,) [length]; negative ones count as zero.
-        final: Opening at which nothing remains, shape (n,) or one number [length].
-    """
+def _linear(largest: npt.ArrayLike, final: float) -> Array:
+    """Remaining fraction 1 - w/w_f at the largest opening so far, between 1 and 0."""
     w = np.maximum(np.asarray(largest, dtype=np.float64), 0.0)
-    end = np.asarray(final, dtype=np.float64)
-    return np.asarray(np.maximum(1.0 - w / end, 0.0))
-
-
-def spent_fraction(largest: npt.ArrayLike, final: npt.ArrayLike) -> Array:
-    """Part of G_c A that a linearly falling force has spent: q (2 - q), q = w/w_f, at most 1.
-
-    Arguments as for :func:`linear_fraction`.
-    """
-    return np.asarray(1.0 - linear_fraction(largest, final) ** 2)
+    return np.asarray(np.maximum(1.0 - w / final, 0.0))
 
 
 @dataclass(frozen=True)
@@ -110,7 +79,7 @@ class Ramp:
         Args:
             progress: Largest opening over final opening, or increments since debonding, shape (n,).
         """
-        return linear_fraction(progress, 1.0 if self.increments is None else self.increments)
+        return _linear(progress, 1.0 if self.increments is None else self.increments)
 
 
 @dataclass(frozen=True)
@@ -118,7 +87,7 @@ class Progressive:
     """The force falls linearly with opening so that exactly the toughness is spent.
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
-    the mesh. The opening never heals; see :func:`final_opening` for where the force ends.
+    the mesh. The opening never heals; the force ends at w_f = 2 G_c A/|F0|.
     """
 
     driver: ClassVar[Driver] = "opening"
@@ -129,7 +98,7 @@ class Progressive:
         Args:
             progress: Largest opening over final opening, shape (n,).
         """
-        return linear_fraction(progress, 1.0)
+        return _linear(progress, 1.0)
 
 
 @dataclass(frozen=True)
@@ -181,46 +150,3 @@ class AmplitudeRelease:
 
 
 Release = Step | Ramp | Progressive | AmplitudeRelease
-
-
-def viscous_damage(
-    damage: npt.ArrayLike, previous: npt.ArrayLike, dt: float, viscosity: float
-) -> Array:
-    """Damage that lags behind, mu dD_v/dt = D - D_v, by one step of implicit Euler.
-
-    Args:
-        damage: Damage D = 1 - phi at the end of the increment, shape (n,).
-        previous: Lagging damage at its start, shape (n,).
-        dt: Time increment, positive [time].
-        viscosity: mu, zero or positive [time]; 0 gives ``damage``.
-
-    Returns:
-        Lagging damage D_v at the end of the increment, shape (n,); the bond force is (1 - D_v) F0.
-    """
-    d = np.asarray(damage, dtype=np.float64)
-    old = np.asarray(previous, dtype=np.float64)
-    return np.asarray((dt * d + viscosity * old) / (dt + viscosity))
-
-
-def viscous_work(
-    force: npt.ArrayLike,
-    lag_start: npt.ArrayLike,
-    lag_end: npt.ArrayLike,
-    opening_start: npt.ArrayLike,
-    opening_end: npt.ArrayLike,
-) -> Array:
-    """Work of the viscous part (D - D_v) F0 of the bond force over an increment, trapezoidal rule.
-
-    Args:
-        force: Size |F0| of the bond force at debonding, shape (n,) [force].
-        lag_start: D - D_v at the start of the increment, shape (n,).
-        lag_end: The same at its end.
-        opening_start: Opening along F0's direction at the start, shape (n,) [length].
-        opening_end: The same at the end.
-
-    Returns:
-        Work, shape (n,) [force length].
-    """
-    lag = np.asarray(lag_start, dtype=np.float64) + np.asarray(lag_end, dtype=np.float64)
-    moved = np.asarray(opening_end, dtype=np.float64) - np.asarray(opening_start, dtype=np.float64)
-    return np.asarray(0.5 * np.asarray(force, dtype=np.float64) * lag * moved)

@@ -167,9 +167,3 @@ class VCCT(RateCriterion):
                 f"{self.tolerance}; give a larger one, math.inf for no limit, or None to switch "
                 "unstable growth off"
             )
-
-    @property
-    def unstable_limit(self) -> float:
-        """Largest f accepted in one increment: 1 + f_tol, or more with unstable growth."""
-        unstable = self.unstable_tolerance
-        return 1.0 + (self.tolerance if unstable is None else unstable)
