@@ -19,6 +19,8 @@ from fxcrack.meshes.bodies import two_bodies
 from fxcrack.meshes.center_crack import center_crack
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.penny import penny
+from fxcrack.output.fields import displacement_function
+from fxcrack.output.interface_fields import interface_fields
 
 Array = npt.NDArray[np.float64]
 
@@ -305,6 +307,52 @@ def test_reference_point_elsewhere() -> None:
             )
 
 
+def test_moving_along_with_the_body_changes_no_length() -> None:
+    curve = ((0.2, 0.5, 0.9, 1.0), (0.9, 1.3, 1.3, 2.0))
+    criterion = fx.CrackLengthVsTime(*curve, reference="upper_face", moving=True)
+    # the plate is carried along by twelve elements
+    carried = [fx.Displacement("bottom", x=1.2, y=0.0), fx.Displacement("top", x=1.2, y=1e-3)]
+    scene = plate(criterion, supports=carried)
+    history = run(scene, fx.Time(0.98))
+    # displacements are a thousand times those that strain it: a million times the round-off
+    assert abs(history["balance"]).max() <= 1e-6 * abs(history["external_work"]).max()
+    times = release_times(scene)
+    assert len(times) > 10
+    for x, t in times.items():
+        # lengths change by the strain of 1e-3/4; a reference point left behind would be off by 1.2
+        assert t == pytest.approx(criterion.time_of(abs(x)), rel=5e-4)
+
+
+@pytest.mark.mpi
+def test_reference_point_and_tip_that_move_are_followed() -> None:
+    """Arms turned by a tenth: the way from the pin to the tip is that of their displacements."""
+    criterion = fx.CrackLengthVsTime((0.0, 1.0), (9.0, 14.0), reference="pin_top", moving=True)
+    still = fx.CrackLengthVsTime((0.0, 1.0), (9.0, 14.0), reference="pin_top")
+    found = []
+    for made in (criterion, still):
+        scene = beam(made)
+        seen: list[float] = []
+
+        def look(event: str, row: Any, scene: fx.Scene = scene, seen: list[float] = seen) -> None:
+            if event != "onset":
+                return
+            (fields,) = interface_fields(scene, displacement_function(scene), row["time"])
+            first = scene.growths[0].paths.initial[0]
+            pin = np.array([0.0, 1.5 + row["u[pin_top.y]"], 0.0])
+            tip = scene.pairs[0].surface.x[first] + fields.displacement[first]
+            seen.append(float(np.linalg.norm(tip - pin)) + row["a[bond]"] - 10.0)
+
+        scene.run(fx.Static(until=fx.Time(0.9)), observers=[look])
+        times = np.array([t for _, t in scene.growths[0].released])
+        assert len(times) >= 4
+        assert_balanced(scene.history)
+        found.append((times, np.array(seen)))
+        scene.close()
+    (moved, ways), (fixed, other) = found
+    assert [criterion.length(t) for t in moved] == pytest.approx(ways, rel=ROUND_OFF)
+    assert [still.length(t) for t in fixed] != pytest.approx(other, rel=1e-3)
+
+
 def test_front_of_a_solid_follows_the_curve() -> None:
     # the mean of the loaded edge is the middle of the width: nodes at the sides are farther away
     criterion = fx.CrackLengthVsTime((0.0, 1.0), (9.0, 14.0), reference="pin_top")
@@ -349,9 +397,10 @@ def test_ways_on_a_line_and_where_tips_come_from() -> None:
     assert behind.x[:, 0] == pytest.approx([1.2, 1.15, 1.1])
     whole = paths.ahead(tips, right, 99.0)
     assert whole.x[-1, 0] == pytest.approx(2.0)  # the end of the surface
-    origin, grown = paths.origins(tips)
-    assert front.surface.x[origin, 0] == pytest.approx(np.sign(front.surface.x[tips.node, 0]))
-    assert sorted(grown) == pytest.approx([0.0, 0.2])
+    found = paths.origins(tips)
+    begin = front.surface.x[found.nearest, 0]
+    assert begin == pytest.approx(np.sign(front.surface.x[tips.node, 0]))
+    assert sorted(found.grown) == pytest.approx([0.0, 0.2])
 
 
 @pytest.mark.parametrize("cell", ["hexahedron", "tetrahedron"])

@@ -277,7 +277,7 @@ def test_shear_modes_default_to_the_mode_before() -> None:
             lambda x: x[0],
             r"returned shape \(2,\) for positions of shape \(3, 2\); it must return 3",
         ),
-        (Tabulated([0.0, 1.0], [1.0, 2.0]), "depends on temperature, but the scene has none"),
+        (Tabulated([0.0, 1.0], [1.0, 2.0]), "depends on temperature, but the debond has none"),
     ],
 )
 def test_missing_toughness_names_the_nodes(value: Any, says: str) -> None:
@@ -346,9 +346,6 @@ def test_one_toughness_needs_no_law(mix: Any) -> None:
 
 def test_windows() -> None:
     assert VCCT(0.2).window == (1.0, 1.2)
-    assert VCCT(0.2).unstable_limit == 1.2
-    assert VCCT(0.2, tolerance=0.05, unstable_tolerance=0.5).unstable_limit == 1.5
-    assert VCCT(0.2, unstable_tolerance=math.inf).unstable_limit == math.inf
     assert not VCCT.allows_normal_only
 
 

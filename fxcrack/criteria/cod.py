@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.criteria.checks import Array, not_negative, positive, table
-from fxcrack.criteria.path import locate
+from fxcrack.criteria.toughness import Tabulated
 from fxcrack.errors import InputError
 
 
@@ -25,16 +25,16 @@ class CrackOpening:
     """Growth when the opening at a distance behind the tip reaches a critical one.
 
     Attributes:
-        critical: Critical opening [length]: a number, or a table (lengths, values) against the
+        critical: Critical opening [length]: a number; a table (lengths, values) against the
             cumulative crack length, linear between entries and not extrapolated: before the first
-            and beyond the last length the value there holds.
+            and beyond the last length the value there holds; or a table against temperature.
         distance: Straight-line distance behind the current tip [length].
         symmetry: The faces lie on a symmetry plane: half the critical opening is used. Needs a
             bond in the normal direction only.
         tolerance: f_tol; growth is accepted while 1 - f_tol <= f <= 1 + f_tol.
     """
 
-    critical: float | tuple[Sequence[float], Sequence[float]]
+    critical: float | tuple[Sequence[float], Sequence[float]] | Tabulated
     distance: float = field(kw_only=True)
     symmetry: bool = field(default=False, kw_only=True)
     tolerance: float = field(default=0.1, kw_only=True)
@@ -47,6 +47,8 @@ class CrackOpening:
         owner = "CrackOpening"
         positive(owner, distance=self.distance)
         not_negative(owner, tolerance=self.tolerance)
+        if isinstance(self.critical, Tabulated):
+            return
         if not isinstance(self.critical, tuple):
             positive(owner, critical=self.critical)
             return
@@ -80,64 +82,48 @@ class CrackOpening:
                 "interface so, or model both halves and leave symmetry out"
             )
 
-    def critical_at(self, crack_length: npt.ArrayLike) -> Array:
-        """Critical opening, halved for symmetry, of the shape of ``crack_length`` [length].
+    def critical_at(
+        self, crack_length: npt.ArrayLike, temperature: npt.ArrayLike | None = None
+    ) -> Array:
+        """Critical opening, halved for symmetry [length].
 
         Args:
-            crack_length: Length along the slave surface from initial to current tip [length].
+            crack_length: Length along the slave surface from initial to current tip, shape (n,)
+                or one number [length].
+            temperature: Temperature at the tips, shape (n,) or one number; None without.
+
+        Raises:
+            InputError: It depends on temperature and none is given.
         """
         grown = np.asarray(crack_length, dtype=np.float64)
-        if isinstance(self.critical, tuple):
+        if isinstance(self.critical, Tabulated):
+            if temperature is None:
+                raise InputError(
+                    "CrackOpening: critical depends on temperature, but the debond has none; give "
+                    "Debond(temperature=...), or the critical opening as a number"
+                )
+            values = self.critical.at(temperature) + 0.0 * grown
+        elif isinstance(self.critical, tuple):
             values = np.interp(grown, *self.critical)
         else:
             values = np.full(grown.shape, self.critical)
         return np.asarray(values / 2.0 if self.symmetry else values)
 
-    def value(self, opening: npt.ArrayLike, crack_length: npt.ArrayLike = 0.0) -> Array:
+    def value(
+        self,
+        opening: npt.ArrayLike,
+        crack_length: npt.ArrayLike = 0.0,
+        temperature: npt.ArrayLike | None = None,
+    ) -> Array:
         """Value f of the criterion.
 
         Args:
             opening: Opening at the distance behind each tip, shape (n,) [length].
-            crack_length: Length along the slave surface from initial to current tip, shape (n,)
-                or one number [length].
+            crack_length: As for :meth:`critical_at`.
+            temperature: Likewise.
 
         Returns:
             Values, shape (n,). Closed faces (negative openings) give 0.
         """
-        return np.asarray(np.maximum(opening, 0.0) / self.critical_at(crack_length))
-
-
-def opening_behind(
-    slave: npt.ArrayLike,
-    master: npt.ArrayLike,
-    normal: npt.ArrayLike,
-    distance: float,
-    *,
-    order: int,
-) -> float:
-    """Opening of the faces at a straight-line distance behind the tip.
-
-    Args:
-        slave: Current positions of the slave nodes along the wake, the tip first, shape
-            (m, dim) [length]; for second order corner, midside, corner, ...
-        master: Current positions of the master points, the tip first, shape (k, dim) [length].
-        normal: Direction from master to slave, of any length, shape (dim,).
-        distance: Distance from the tip [length].
-        order: Order of the faces, 1 or 2.
-
-    Returns:
-        Distance between the two points along the normal [length]; negative where faces overlap.
-
-    Raises:
-        InputError: The distance lies outside the end points of a surface.
-    """
-    points = []
-    for name, nodes in (("slave", slave), ("master", master)):
-        x = np.asarray(nodes, dtype=np.float64)
-        rows, weights = locate(f"CrackOpening, {name} surface", x, distance, order)
-        points.append(weights @ x[rows])
-    n = np.asarray(normal, dtype=np.float64)
-    length = float(np.linalg.norm(n))
-    if not 0.0 < length < np.inf:
-        raise InputError(f"CrackOpening: the normal {n.tolist()} has no direction")
-    return float((points[0] - points[1]) @ n / length)
+        critical = self.critical_at(crack_length, temperature)
+        return np.asarray(np.maximum(opening, 0.0) / critical)

@@ -4,9 +4,9 @@ With initial tip 1, current tip 3 and node 2 behind it (on the open side),
 
     l_3 = l_1 + d_12 + d_23,    f = (l(t) - (l_3 - d_23))/d_23
 
-l_1 is the straight line from the reference point (the mean current position of a node set) to the
-initial tip, the other lengths run along the slave surface, all in the deformed configuration, and
-l(t) is the user's curve. f grows from 0, crack at node 2, to 1, crack at the tip: the tip debonds.
+l_1 is the straight line from the reference point (the mean position of a node set) to the initial
+tip, the other lengths run along the slave surface, and l(t) is the user's curve. f grows from 0,
+crack at node 2, to 1, crack at the tip: the tip debonds.
 """
 
 from __future__ import annotations
@@ -30,13 +30,16 @@ class CrackLengthVsTime:
         times: Total times, increasing, shape (n_entries,) [time].
         lengths: Crack lengths from the reference point, never decreasing, shape (n_entries,)
             [length].
-        reference: Name of the node set whose mean current position is the reference point.
+        reference: Name of the node set whose mean position is the reference point.
+        moving: Whether the reference point and the initial tips take their displacements along;
+            positions are those of the undeformed body otherwise.
         tolerance: f_tol; growth is accepted while 1 - f_tol <= f <= 1 + f_tol.
     """
 
     times: Sequence[float]
     lengths: Sequence[float]
     reference: str = field(kw_only=True)
+    moving: bool = field(default=False, kw_only=True)
     tolerance: float = field(default=0.1, kw_only=True)
 
     allows_normal_only: ClassVar[bool] = True
@@ -103,17 +106,27 @@ class CrackLengthVsTime:
         return float(self.times[i - 1] + part * (self.times[i] - self.times[i - 1]))
 
     def value(self, time: float, tip: npt.ArrayLike, d_behind: npt.ArrayLike) -> Array:
-        """Value f of the criterion.
+        """Value f of the criterion; 0 before the curve begins.
+
+        There is no extrapolation: after the end of the curve its last length stays.
 
         Args:
             time: Total time [time].
-            tip: Length l_3 of each tip node, see :func:`length_to_tip`, shape (n,) [length].
+            tip: As for :meth:`fraction`.
+            d_behind: Likewise.
+        """
+        length = self.length(time)
+        begun = length > -np.inf
+        return np.where(begun, self.fraction(length if begun else 0.0, tip, d_behind), 0.0)
+
+    def fraction(self, length: npt.ArrayLike, tip: npt.ArrayLike, d_behind: npt.ArrayLike) -> Array:
+        """Value f of the criterion when the curve has reached a length.
+
+        Args:
+            length: Length of the curve, shape (n,) or one number [length].
+            tip: Length l_3 of each tip node, shape (n,) [length].
             d_behind: Distance d_23 along the slave surface from the node behind, shape (n,)
                 [length].
-
-        Returns:
-            Values, shape (n,); 0 before the curve begins. There is no extrapolation: after the end
-            of the curve its last length stays.
 
         Raises:
             InputError: A distance is not positive.
@@ -125,23 +138,4 @@ class CrackLengthVsTime:
                 "CrackLengthVsTime: the distance from the node behind the tip must be positive, "
                 f"not {d.min():g}; look at the slave surface near the tip"
             )
-        length = self.length(time)
-        if length == -np.inf:
-            return np.zeros(np.broadcast_shapes(l3.shape, d.shape))
-        return np.asarray((length - (l3 - d)) / d)
-
-
-def length_to_tip(reference: npt.ArrayLike, path: npt.ArrayLike) -> float:
-    """Crack length: straight to the initial tip, then along the slave surface to the current tip.
-
-    Args:
-        reference: Current position of the reference point, shape (dim,) [length].
-        path: Current positions of slave nodes from the initial to the current tip, both included,
-            shape (m, dim) [length].
-
-    Returns:
-        Length [length].
-    """
-    x = np.asarray(path, dtype=np.float64)
-    straight = np.linalg.norm(x[0] - np.asarray(reference, dtype=np.float64))
-    return float(straight + np.linalg.norm(np.diff(x, axis=0), axis=1).sum())
+        return np.asarray((np.asarray(length, dtype=np.float64) - (l3 - d)) / d)

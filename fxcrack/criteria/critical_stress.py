@@ -76,8 +76,8 @@ class CriticalStress:
             if isinstance(value, Tabulated):
                 if temperature is None:
                     raise InputError(
-                        f"CriticalStress: {name} depends on temperature, but the scene has none; "
-                        "give the scene a temperature, or the strength as a number"
+                        f"CriticalStress: {name} depends on temperature, but the debond has none; "
+                        "give Debond(temperature=...), or the strength as a number"
                     )
                 columns.append(value.at(temperature))
             else:
@@ -89,8 +89,7 @@ class CriticalStress:
 
         Args:
             traction: Bond traction at the distance ahead of the tip, tension positive, as (normal,
-                growth direction, front tangent), shape (n, 3) [stress]; get it from nodal ones
-                by :func:`~fxcrack.criteria.path.at_distance`.
+                growth direction, front tangent), shape (n, 3) [stress].
             temperature: Temperature there, shape (n,) or one number; None without temperatures.
 
         Returns:

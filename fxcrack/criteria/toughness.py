@@ -113,8 +113,8 @@ def resolve(
     if isinstance(value, Tabulated):
         if temperature is None:
             raise InputError(
-                f"{owner}: {name} depends on temperature, but the scene has none; "
-                "give the scene a temperature, or the property as a number"
+                f"{owner}: {name} depends on temperature, but the debond has none; "
+                "give Debond(temperature=...), or the property as a number"
             )
         result = np.broadcast_to(value.at(temperature), (n,))
     elif callable(value):

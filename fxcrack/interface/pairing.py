@@ -41,6 +41,8 @@ class Interface:
         tolerance: Search tolerance, length: how far a slave node may lie from the master surface;
             a tenth of the master's facet size by default.
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
+        strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
+            and ignored otherwise.
         name: What the history calls the interface; the slave's name by default.
     """
 
@@ -51,6 +53,7 @@ class Interface:
     normal_only: bool = False
     tolerance: float | None = None
     gap: str = "adjust"
+    strict: bool = False
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -136,9 +139,20 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
         index_map = continuum.space.dofmap.index_map
         mine = np.asarray(index_map.local_to_global(owned), dtype=np.int64)
         named = np.concatenate(continuum.comm.allgather(mine))
-        stray = int(np.sum(~np.isin(named, surface.dofs)))
-        if stray:
-            log.warn("%s: %d nodes of bonded set '%s' are not slave nodes", where, stray, chosen)
+        outside = ~np.isin(mine, surface.dofs)
+        places = continuum.comm.allgather(continuum.positions()[owned[outside]])
+        stray = np.concatenate(places)
+        if len(stray):
+            found = (
+                f"{where}: {len(stray)} nodes of bonded set '{chosen}' are not slave nodes, one of "
+                f"them at {place(stray[0])}"
+            )
+            if interface.strict:
+                raise InterfaceError(
+                    f"{found}; take them out of the set, let the slave surface extend to them, or "
+                    "leave out strict=True"
+                )
+            log.warn("%s; they are ignored", found)
         return np.asarray(np.isin(surface.dofs, named))
     if callable(chosen):
         marks = np.asarray(chosen(np.ascontiguousarray(surface.x.T)))

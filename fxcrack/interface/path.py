@@ -10,12 +10,15 @@ so that a zig-zag line is as long as the straight one it follows. Reference posi
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.interface.front import Front, Tips
+from fxcrack.interface.projection import project
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -45,6 +48,27 @@ class Way:
         return np.asarray(np.linalg.norm(self.x - self.x[0], axis=1))
 
 
+@dataclass(frozen=True)
+class Origins:
+    """Where the present tips come from.
+
+    Attributes:
+        nodes: Initial tips on either side of the origin (twice the same where it is one), shape
+            (n_tips, 2).
+        weights: Their weights, shape (n_tips, 2).
+        grown: Length from the origin to the tip along the surface, shape (n_tips,).
+    """
+
+    nodes: Ints
+    weights: Array
+    grown: Array
+
+    @property
+    def nearest(self) -> Ints:
+        """The initial tip that the origin is nearest to, shape (n_tips,)."""
+        return np.asarray(self.nodes[np.arange(len(self.nodes)), self.weights.argmax(axis=1)])
+
+
 class SurfacePaths:
     """Ways along one slave surface, and where the present tips come from.
 
@@ -53,6 +77,7 @@ class SurfacePaths:
 
     Attributes:
         longest: Longest edge of a face, length.
+        initial: Nodes of the initial front.
     """
 
     def __init__(self, front: Front) -> None:
@@ -63,6 +88,13 @@ class SurfacePaths:
         corner = self._surface.x[self._surface.facets[:, : self._surface.n_corners]]
         between = np.linalg.norm(corner[:, :, None] - corner[:, None], axis=-1)
         self.longest = float(between.max())
+        normals = self._surface.normals
+        self._flat = bool(np.abs(normals - normals[0]).max() < 1e-9)
+        self._pieces = self._initial_pieces() if self._surface.dim == 2 else np.zeros((0, 2), int)
+        n = self._surface.n_nodes
+        self._origin = np.zeros((n, 2), dtype=np.int64)
+        self._weights = np.zeros((n, 2))
+        self._grown = np.full(n, np.nan)
 
     def ahead(self, tips: Tips, i: int, reach: float) -> Way:
         """Way over bonded nodes ahead of a tip, until it is ``reach`` long or no node follows.
@@ -87,27 +119,62 @@ class SurfacePaths:
         back = -tips.frame[i, :, 1]
         return self._walk(int(tips.node[i]), back, inside, reach, straight=True)
 
-    def origins(self, tips: Tips) -> tuple[Ints, Array]:
-        """Initial tip of every present tip, and the length grown from it along the surface.
+    def origins(self, tips: Tips) -> Origins:
+        """Origin of every present tip on the initial front, and the length grown from there.
 
         On a line: the first node on the way back behind which the surface was open from the
-        beginning. On a surface: the nearest node of the initial front, and the distance to it
-        (the length along the surface where that is flat).
-
-        Returns:
-            Slave nodes and lengths, shape (n_tips,) each.
+        beginning. On a surface: the foot of the perpendicular on the initial front, a chain of
+        straight pieces between its nodes. The length is that of the straight way between the two,
+        laid on the surface (exact on planes, and across the axis of cylinders).
         """
-        x = self._surface.x
         if self._surface.dim == 2:
-            away = np.linalg.norm(x[tips.node][:, None] - x[self.initial][None], axis=2)
-            nearest = np.argmin(away, axis=1)
-            return self.initial[nearest], away[np.arange(len(tips)), nearest]
+            new = tips.node[np.isnan(self._grown[tips.node])]
+            if len(new):
+                self._trace(new)
+            return Origins(
+                self._origin[tips.node], self._weights[tips.node], self._grown[tips.node]
+            )
         node, grown = tips.node.copy(), np.zeros(len(tips))
         for i in range(len(tips)):
             back = -tips.frame[i, :, 1]
             way = self._walk(int(node[i]), back, self._was_bonded, np.inf, straight=False)
             node[i], grown[i] = way.nodes[-1], way.s[-1]
-        return node, grown
+        return Origins(np.stack([node, node], axis=1), np.tile([1.0, 0.0], (len(node), 1)), grown)
+
+    def _initial_pieces(self) -> Ints:
+        """Pairs of initial front nodes that share a facet cut by the front, shape (n, 2)."""
+        at_front = np.zeros(self._surface.n_nodes, dtype=bool)
+        at_front[self.initial] = True
+        pieces = [(int(k), int(k)) for k in self.initial]
+        for facet in self._surface.facets[(~self._was_bonded[self._surface.facets]).any(axis=1)]:
+            pieces += combinations(facet[at_front[facet]].tolist(), 2)
+        return np.array(pieces, dtype=np.int64).reshape(-1, 2)
+
+    def _trace(self, nodes: Ints) -> None:
+        """Find the origins of nodes on a surface; they stay the same for good."""
+        x = self._surface.x
+        a, b = self._pieces.T
+        along = x[b] - x[a]
+        square = np.maximum((along**2).sum(axis=1), np.finfo(float).tiny)
+        for node in nodes:
+            part = np.clip(((x[node] - x[a]) * along).sum(axis=1) / square, 0.0, 1.0)
+            away = np.linalg.norm(x[a] + part[:, None] * along - x[node], axis=1)
+            k = int(np.argmin(away))
+            foot = x[a[k]] + part[k] * along[k]
+            self._origin[node] = a[k], b[k]
+            self._weights[node] = 1.0 - part[k], part[k]
+            self._grown[node] = self._laid(foot, x[node])
+
+    def _laid(self, start: Array, end: Array) -> float:
+        """Length of the straight way between two points laid on the surface."""
+        straight = float(np.linalg.norm(end - start))
+        if self._flat or straight == 0.0:
+            return straight
+        steps = 4 * math.ceil(straight / self.longest)
+        way = start + np.linspace(0.0, 1.0, steps + 1)[:, None] * (end - start)
+        return float(
+            np.linalg.norm(np.diff(project(way, self._surface).foot, axis=0), axis=1).sum()
+        )
 
     def _walk(
         self, start: int, direction: Array, inside: Bools, reach: float, *, straight: bool

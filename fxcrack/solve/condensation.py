@@ -10,6 +10,7 @@ minus the work-conjugate displacements of the load patterns; monitored displacem
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +33,7 @@ from fxcrack.solve.petsc_schur import (
 )
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 
 
 @dataclass
@@ -47,9 +49,16 @@ class Timings:
 
 
 def border_vectors(
-    continuum: Continuum, loads: list[Load], monitors: list[Monitor]
+    continuum: Continuum, loads: list[Load], monitors: list[Monitor], followed: Sequence[Ints] = ()
 ) -> list[PETSc.Vec]:
-    """Force patterns with the minus sign, then monitors, as vectors on displacements."""
+    """Force patterns with the minus sign, then monitors, as vectors on displacements; collective.
+
+    Args:
+        continuum: Displacement space.
+        loads: Force patterns.
+        monitors: Monitored displacements.
+        followed: Sets of this rank's nodes whose mean displacement is wanted, all components.
+    """
     out = []
     for load in loads:
         vector = continuum.load_vector(load)
@@ -67,6 +76,13 @@ def border_vectors(
         for i, component in enumerate(monitor.direction):
             vector.array[continuum.gdim * nodes + i] = component / count
         out.append(vector)
+    for mine in followed:
+        count = continuum.comm.allreduce(len(mine))
+        for i in range(continuum.gdim):
+            size = (continuum.n_local, continuum.n_global)
+            vector = PETSc.Vec().createMPI(size, comm=continuum.comm)
+            vector.array[continuum.gdim * mine + i] = 1.0 / count
+            out.append(vector)
     return out
 
 

@@ -97,6 +97,7 @@ class CondensedModel:
         self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
         self.keep: list[tuple[int, int]] = []
+        self._followed: list[Ints] = []
         self._soft: list[SoftBond] = []
         self._taken = 0.0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
@@ -148,7 +149,9 @@ class CondensedModel:
         self.timings.add("compile", start)
         start = time.perf_counter()
         self._stiffness = self.continuum.stiffness()
-        self._borders = border_vectors(self.continuum, self.loads, self.monitors)
+        self._borders = border_vectors(
+            self.continuum, self.loads, self.monitors, self._followed
+        )
         self.timings.add("assemble", start)
 
     def _choose_window(self) -> JumpCoordinates:
@@ -451,6 +454,25 @@ class CondensedModel:
             last = point
         self.state = last
         return released
+
+    # -- displacements that criteria follow ----------------------------------------------
+
+    def follow(self, nodes: npt.NDArray[np.integer]) -> int:
+        """Follow the mean displacement of some nodes from the first step on.
+
+        Args:
+            nodes: Those of them that this rank owns, shape (n,).
+
+        Returns:
+            Its number in :meth:`motion`.
+        """
+        self._followed.append(np.asarray(nodes, dtype=np.int64))
+        return len(self._followed) - 1
+
+    def motion(self, state: Equilibrium) -> Array:
+        """Displacements that are followed, shape (n_followed, gdim), length."""
+        values = self.system.monitors(state)[len(self.monitors) :]
+        return values.reshape(len(self._followed), self.continuum.gdim)
 
     # -- the way back to fields ----------------------------------------------------------
 

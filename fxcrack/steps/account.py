@@ -262,7 +262,8 @@ class Account:
             if moves:
                 row[load] = float(a)
             row[answer] = float(r)
-        for monitor, value in zip(model.monitors, model.system.monitors(state), strict=True):
+        # displacements that criteria follow come after those of the user
+        for monitor, value in zip(model.monitors, model.system.monitors(state), strict=False):
             row[f"m[{monitor.title}]"] = float(value)
         for g, v in zip(self.growths, self._values, strict=True):
             row[f"a[{g.title}]"] = g.extent.length(v.tips)

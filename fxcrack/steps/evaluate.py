@@ -7,7 +7,6 @@ reports. So the place where f reaches 1 on a linear piece is found without anoth
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -87,7 +86,7 @@ class RateEvaluator:
         model: Condensed model.
         p: Number of the pair.
         criterion: Criterion with toughness and mode mix.
-        temperature: Temperature of the interface, see :class:`Debond`.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
     """
 
     degree = 2
@@ -99,7 +98,7 @@ class RateEvaluator:
         model: CondensedModel,
         p: int,
         criterion: RateCriterion,
-        temperature: float | Callable[[Array], Array] | None = None,
+        temperature: Array | None = None,
     ) -> None:
         self.model = model
         self.p = p
@@ -109,10 +108,7 @@ class RateEvaluator:
         surface = model.fronts[p].surface
         criterion.check_slaves(surface.n_nodes)
         x = surface.x[:, : model.continuum.gdim]
-        self._temperature: Array | None = None
-        if temperature is not None:
-            given = temperature(x) if callable(temperature) else temperature
-            self._temperature = np.broadcast_to(np.asarray(given, dtype=float), (len(x),))
+        self._temperature = temperature
         self.toughness = criterion.toughness_at(
             x, np.arange(len(x)), self._temperature, n_slave=len(x)
         )

@@ -63,14 +63,18 @@ class _AtDistance:
         model: Condensed model, with its front in the initial state.
         p: Number of the pair.
         distance: From the tip, length.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
     """
 
     degree = 1
 
-    def __init__(self, model: CondensedModel, p: int, distance: float) -> None:
+    def __init__(
+        self, model: CondensedModel, p: int, distance: float, temperature: Array | None
+    ) -> None:
         self.model = model
         self.p = p
         self.distance = distance
+        self.temperature = temperature
         self.front = model.fronts[p]
         self.surface = self.front.surface
         self.paths = SurfacePaths(self.front)
@@ -83,6 +87,10 @@ class _AtDistance:
             parts = [self._part(tips, i) for i in range(len(tips))]
             self._known = {key: Stencil.of(parts, self.surface.order)}
         return self._known[key]
+
+    def temperature_at(self, tips: Tips) -> Array | None:
+        """Temperature of the tips, shape (n,); None without."""
+        return None if self.temperature is None else self.temperature[tips.node]
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
         """Slave nodes and weights at one tip; each evaluator has its own."""
@@ -116,18 +124,25 @@ class StressEvaluator(_AtDistance):
         model: Condensed model, with its front in the initial state.
         p: Number of the pair.
         criterion: Strengths and distance.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
 
     Raises:
         InputError: The distance lies outside the bonded part ahead of an initial tip on a line
-            (a warning on a surface), or a strength depends on temperature.
+            (a warning on a surface), or a strength depends on temperature and there is none.
     """
 
     behind = 0.0
 
-    def __init__(self, model: CondensedModel, p: int, criterion: CriticalStress) -> None:
-        super().__init__(model, p, criterion.distance)
+    def __init__(
+        self,
+        model: CondensedModel,
+        p: int,
+        criterion: CriticalStress,
+        temperature: Array | None = None,
+    ) -> None:
+        super().__init__(model, p, criterion.distance, temperature)
         self.criterion = criterion
-        criterion.strength()
+        criterion.strength(temperature)
         self.ahead = criterion.distance + self.paths.longest
         self._starting = True
         self._check_start()
@@ -163,7 +178,8 @@ class StressEvaluator(_AtDistance):
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and the stresses s11 (normal), s12 (growth direction) and in 3-D s13 (front)."""
         names = ("s11", "s12", "s13")[: self.model.continuum.gdim]
-        return self.criterion.value(measured), dict(zip(names, measured.T, strict=False))
+        f = self.criterion.value(measured, self.temperature_at(tips))
+        return f, dict(zip(names, measured.T, strict=False))
 
     def needs(self, tips: Tips) -> Ints:
         """The nodes whose forces are used."""
@@ -179,16 +195,25 @@ class OpeningEvaluator(_AtDistance):
         model: Condensed model, with its front in the initial state.
         p: Number of the pair.
         criterion: Critical openings and distance.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
 
     Raises:
-        InputError: The distance lies outside the end points of the pair.
+        InputError: The distance lies outside the end points of the pair, or the critical opening
+            depends on temperature and there is none.
     """
 
     ahead = 0.0
 
-    def __init__(self, model: CondensedModel, p: int, criterion: CrackOpening) -> None:
-        super().__init__(model, p, criterion.distance)
+    def __init__(
+        self,
+        model: CondensedModel,
+        p: int,
+        criterion: CrackOpening,
+        temperature: Array | None = None,
+    ) -> None:
+        super().__init__(model, p, criterion.distance, temperature)
         self.criterion = criterion
+        criterion.critical_at(0.0, temperature)
         self.behind = criterion.distance + self.paths.longest
         self._grown = np.zeros(self.surface.n_nodes)
         self._warned = False
@@ -220,7 +245,7 @@ class OpeningEvaluator(_AtDistance):
         """Stencil of the tips; the lengths they have grown are found with it."""
         key = (self.front.version, tips.node.tobytes())
         if key not in self._known:
-            self._grown[tips.node] = self.paths.origins(tips)[1]
+            self._grown[tips.node] = self.paths.origins(tips).grown
         return super().stencil(tips)
 
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
@@ -236,7 +261,7 @@ class OpeningEvaluator(_AtDistance):
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F, the opening cod and the length the tip has grown."""
         opening, grown = measured.T
-        f = self.criterion.value(opening, grown)
+        f = self.criterion.value(opening, grown, self.temperature_at(tips))
         return f, {"cod": opening, "grown": grown}
 
     def needs(self, tips: Tips) -> Ints:

@@ -3,9 +3,11 @@
     l_3 = l_1 + d_12 + d_23,    f = (l(t) - (l_3 - d_23))/d_23
 
 l_1 is the straight line from the reference point to the initial tip, the rest runs along the slave
-surface. In small strain all positions are reference positions: the reference point, the mean
-current position of its nodes, moves by a mean displacement that is small beside every length.
-In 3-D each front node is measured through the nearest node of the initial front.
+surface. In 3-D the initial tip is the point of the initial front that the front node came from.
+
+In small strain positions are those of the undeformed body. With ``moving`` the reference point
+and the initial tips take their displacements along: border rows of the condensation give them,
+linear between equilibria. Lengths along the surface would differ by its strain only.
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from mpi4py import MPI
 from fxcrack import log
 from fxcrack.criteria import CrackLengthVsTime
 from fxcrack.interface.front import Tips
-from fxcrack.interface.path import SurfacePaths
+from fxcrack.interface.path import Origins, SurfacePaths
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 
@@ -51,7 +53,7 @@ class LengthEvaluator:
         criterion: Curve and reference nodes.
 
     Attributes:
-        reference: Reference point, shape (3,), length.
+        reference: Reference point of the undeformed body, shape (3,), length.
         ends: Time of the last entry of the curve: growth is over then.
 
     Raises:
@@ -63,57 +65,83 @@ class LengthEvaluator:
     behind = 0.0
 
     def __init__(self, model: CondensedModel, p: int, criterion: CrackLengthVsTime) -> None:
+        self.model = model
         self.criterion = criterion
         self.front = model.fronts[p]
         self.paths = SurfacePaths(self.front)
         self.reference = mean_position(model, criterion.reference)
         self.ends = float(criterion.times[-1])
-        surface = self.front.surface
-        self._first = np.linalg.norm(surface.x - self.reference, axis=1)
-        self._starts = criterion.can_start(self._first)
-        self._length = np.zeros(surface.n_nodes)
-        self._moves = np.zeros(surface.n_nodes, dtype=bool)
         self._known: tuple[int, bytes] | None = None
-        initial = self.paths.initial
+        self._origins: Origins
+        surface, initial = self.front.surface, self.paths.initial
+        self._begin = np.zeros((surface.n_nodes, 3))
+        self._grown = np.zeros(surface.n_nodes)
+        self._moves = np.zeros(surface.n_nodes, dtype=bool)
+        first = np.linalg.norm(surface.x - self.reference, axis=1)
+        self._starts = criterion.can_start(first)
+        self._followed: list[int] = []
+        self._slot = np.zeros(surface.n_nodes, dtype=np.int64)
+        if criterion.moving and len(initial):
+            self._followed.append(model.follow(model.continuum.owned_nodes(criterion.reference)))
+            gdim, n_local = model.continuum.gdim, model.continuum.n_local
+            for block in surface.dofs[initial] - model.continuum.offset // gdim:
+                here = np.array([block]) if 0 <= block < n_local // gdim else np.zeros(0, dtype=int)
+                self._followed.append(model.follow(here))
+            self._slot[initial] = 1 + np.arange(len(initial))
         stuck = initial[~self._starts[initial]]
         if len(stuck):
-            i = int(stuck[np.argmin(self._first[stuck])])
+            i = int(stuck[np.argmin(first[stuck])])
             log.warn(
                 "interface '%s': the first tabulated crack length %g is larger than the distance "
                 "%g from reference '%s' to the first bonded node at (%s); %s of %d tips will "
                 "never propagate: let the curve begin with a smaller length",
                 model.pairs[p].title,
                 criterion.lengths[0],
-                self._first[i],
+                first[i],
                 criterion.reference,
                 ", ".join(f"{c:.6g}" for c in surface.x[i, : model.continuum.gdim]),
                 "all" if len(stuck) == len(initial) else str(len(stuck)),
                 len(initial),
             )
 
-    def lengths(self, tips: Tips) -> tuple[Array, Bools]:
-        """Crack length l_3 of the tips, and whether they can move at all, shape (n,) each."""
+    def _look_at(self, tips: Tips) -> Origins:
+        """Note where the tips come from, when the front has moved."""
         key = (self.front.version, tips.node.tobytes())
         if key != self._known:
-            origin, grown = self.paths.origins(tips)
-            self._length[tips.node] = self._first[origin] + grown
-            self._moves[tips.node] = self._starts[origin]
+            origins = self._origins = self.paths.origins(tips)
+            x = self.front.surface.x[origins.nodes]
+            self._begin[tips.node] = np.einsum("nk,nkc->nc", origins.weights, x)
+            self._grown[tips.node] = origins.grown
+            self._moves[tips.node] = self._starts[origins.nearest]
             self._known = key
-        return self._length[tips.node], self._moves[tips.node]
+        return self._origins
 
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
-        """F and l_3 of the tips, shape (n, 2)."""
-        length, moves = self.lengths(tips)
+        """Length of the curve, 1 once it has begun, way of the origins from the reference point.
+
+        Shape (n, 5); the way is that of their displacements alone.
+        """
         begin = self.criterion.times[0]
         if abs(time - begin) <= _SAME_TIME * abs(begin):
             time = begin
-        f = self.criterion.value(time, length, tips.d_behind)
-        return np.stack([np.where(moves, f, 0.0), length], axis=1)
+        origins = self._look_at(tips)
+        out = np.zeros((len(tips), 5))
+        out[:, 0] = max(self.criterion.length(time), self.criterion.lengths[0])
+        out[:, 1] = time >= begin
+        if self._followed:
+            motion = self.model.motion(state)[self._followed]
+            at_tips = motion[self._slot[origins.nodes]]
+            way = np.einsum("nk,nkc->nc", origins.weights, at_tips) - motion[0]
+            out[:, 2 : 2 + way.shape[1]] = way
+        return out
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F, and the crack length from the reference point to the tip."""
-        f, length = measured.T
-        return f, {"length": length}
+        way = self._begin[tips.node] - self.reference + measured[:, 2:]
+        length = np.linalg.norm(way, axis=1) + self._grown[tips.node]
+        f = self.criterion.fraction(measured[:, 0], length, tips.d_behind)
+        begun = measured[:, 1] > 1.0 - _SAME_TIME
+        return np.where(begun & self._moves[tips.node], f, 0.0), {"length": length}
 
     def needs(self, tips: Tips) -> Ints:
         """Nothing: neither forces nor openings count."""

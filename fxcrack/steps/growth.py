@@ -22,6 +22,8 @@ from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Tips
 from fxcrack.interface.pairing import Interface
+from fxcrack.interface.path import SurfacePaths
+from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
@@ -46,7 +48,7 @@ class Debond:
         criterion: When.
         release: How the bond force goes to zero.
         temperature: Temperature of the interface, a number or a function of positions of shape
-            (n, gdim), for toughness tabulated against it.
+            (n, gdim), for toughness, strength or critical opening tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.
     """
 
@@ -54,7 +56,7 @@ class Debond:
     criterion: Criterion
     release: Release = field(default_factory=Step)
     watch: Sequence[Criterion] = ()
-    temperature: float | Callable[[Array], Array] | None = None
+    temperature: float | Callable[[Array], npt.ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""
@@ -95,7 +97,7 @@ class Growth:
     Attributes:
         n_released: Nodes let go so far.
         records: What is known of every release, in order.
-        initial_tips: Front nodes at the beginning.
+        paths: Where tips come from.
     """
 
     def __init__(self, model: CondensedModel, p: int, debond: Debond) -> None:
@@ -110,12 +112,12 @@ class Growth:
         self.front = model.fronts[p]
         self.extent = CrackExtent(self.front)
         self.evaluator: Evaluator = make_evaluator(model, p, debond.criterion, debond.temperature)
-        self.watched = [make_evaluator(model, p, c) for c in debond.watch]
+        self.watched = [make_evaluator(model, p, c, debond.temperature) for c in debond.watch]
         every = [self.evaluator, *self.watched]
         model.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
         self.n_released = 0
         self.records: list[ReleaseRecord] = []
-        self.initial_tips = self.front.candidates()
+        self.paths = SurfacePaths(self.front)
 
     @property
     def released(self) -> list[tuple[int, float]]:
@@ -188,13 +190,43 @@ def make_evaluator(
     model: CondensedModel,
     p: int,
     criterion: Criterion,
-    temperature: float | Callable[[Array], Array] | None = None,
+    temperature: float | Callable[[Array], npt.ArrayLike] | None = None,
 ) -> Evaluator:
-    """The evaluator that goes with a criterion; collective."""
+    """The evaluator that goes with a criterion; collective.
+
+    Raises:
+        InputError: The criterion does not fit the interface, or a temperature is missing or wrong.
+    """
+    at_nodes = temperature_at_nodes(model, p, temperature)
     if isinstance(criterion, CriticalStress):
-        return StressEvaluator(model, p, criterion)
+        return StressEvaluator(model, p, criterion, at_nodes)
     if isinstance(criterion, CrackOpening):
-        return OpeningEvaluator(model, p, criterion)
+        return OpeningEvaluator(model, p, criterion, at_nodes)
     if isinstance(criterion, CrackLengthVsTime):
         return LengthEvaluator(model, p, criterion)
-    return RateEvaluator(model, p, criterion, temperature)
+    return RateEvaluator(model, p, criterion, at_nodes)
+
+
+def temperature_at_nodes(
+    model: CondensedModel, p: int, temperature: float | Callable[[Array], npt.ArrayLike] | None
+) -> Array | None:
+    """Temperature of the slave nodes, shape (n_nodes,); None without.
+
+    Raises:
+        InputError: The function returned another shape, or a temperature is not finite.
+    """
+    if temperature is None:
+        return None
+    x = model.fronts[p].surface.x[:, : model.continuum.gdim]
+    where = f"interface '{model.pairs[p].title}'"
+    given = np.asarray(temperature(x) if callable(temperature) else temperature, dtype=float)
+    if given.shape not in ((), (len(x),)):
+        raise InputError(
+            f"{where}: temperature gives shape {given.shape} for positions of shape {x.shape}; one "
+            "number per slave node is needed (the first coordinate is x[:, 0])"
+        )
+    values = np.broadcast_to(given, (len(x),))
+    if not np.isfinite(values).all():
+        i = int(np.argmin(np.isfinite(values)))
+        raise InputError(f"{where}: temperature is {values[i]} at {place(x[i])}; give a number")
+    return values
