@@ -30,6 +30,11 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Observer = Callable[[str, Row], None]
 
+_NEVER = (
+    "the criterion is not reached however large the load becomes; the step ends where that search "
+    "began"
+)
+
 
 class March(Account):
     """One quasi-static step on a condensed model: the three ways to step.
@@ -89,8 +94,7 @@ class March(Account):
             if self._curves_have_ended():
                 return "the curves of crack length against time have ended"
             if not self._load_to_event():
-                reason = self._ended()
-                return reason or "the criterion is not reached however large the load becomes"
+                return self._ended() or _NEVER
 
     def _run_path(self) -> str:
         if self.breaks:
@@ -111,7 +115,7 @@ class March(Account):
             if max(self._largest()) > 1.0 + 1e-9:
                 self._unload_to_event()
             elif max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
-                return self._ended() or "the criterion is not reached however large the load is"
+                return self._ended() or _NEVER
             self._record("onset")
             self._let_go()
 
@@ -129,19 +133,21 @@ class March(Account):
                     "end condition; raise max_increments or maximum, or end the step at a Time"
                 )
             control.size = max(control.size, min(self._scaled(), self.step.maximum))
-            target = min([self.time + control.size, self._end_time, *self._breaks_ahead()])
-            states = self.model.system.snapshot()
+            met = self._met_at_start()
+            size = self.step.minimum if any(met) else control.size
+            target = min([self.time + size, self._end_time, *self._breaks_ahead()])
+            books = self._books()
             self.increment += 1
-            pieces = list(self._pieces(target))
-            self._follow(pieces, target)
+            self._follow(self._pieces(target), target)
             values = self._evaluate()
             excess = [
                 v.f.max(initial=0.0) - self._upper(g)
-                for g, v in zip(self.growths, values, strict=True)
+                for g, v, no_matter in zip(self.growths, values, met, strict=True)
+                if not no_matter
             ]
             if max(excess, default=-1.0) > 1e-12:
                 self.increment -= 1
-                used = target - self._undo(states)
+                used = target - self._undo(books)
                 control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
             self._values = values
@@ -149,7 +155,8 @@ class March(Account):
                 if isinstance(ramp, ViscousRelease):
                     ramp.accept(self.time)
             self._record("increment")
-            control.accepted()
+            if not any(met):
+                control.accepted()
             while self._any_ready() and not self._ended():
                 self._let_go(all_ready=True)
                 control.suggest(self._first_increment())
@@ -171,9 +178,6 @@ class March(Account):
     # -- moving along the load -----------------------------------------------------------
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
-        self._undo_state = (
-            self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
-        )  # fmt: skip
         return list(
             self.model.system.pieces(
                 self.model.state, self.loads_at(target), self._force_at(target)
@@ -185,10 +189,17 @@ class March(Account):
             self._advance(self.model.state, point, target)
         self.time = target
 
-    def _undo(self, states: Any) -> float:
+    def _books(self) -> Any:
+        """What :meth:`_undo` needs to return to the present equilibrium."""
+        kept = (self.time, self.model.state, self.work, self.released, self._by_force, self.viscous)
+        return kept, self.model.system.snapshot(), self._values
+
+    def _undo(self, books: Any) -> float:
+        """Return to an earlier equilibrium, with the same bonds, and its time."""
+        kept, states, self._values = books
         (
             self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
-        ) = self._undo_state  # fmt: skip
+        ) = kept  # fmt: skip
         self.model.system.restore(states)
         return self.time
 
@@ -202,21 +213,23 @@ class March(Account):
         """Load until f = 1 somewhere, an amplitude bends or the end time comes.
 
         Returns:
-            False if the load grew beyond all bounds without an event.
+            False if the load grew beyond all bounds without an event; the state is then that of
+            the last event, or that of time 1, the loads as they were given, if none was before.
         """
         limit = min([self._end_time, *self._breaks_ahead()])
         if limit >= LARGE and self._only_round_off():
             return False
+        begin, rows = None, len(self.history)
+        if self.time > 0.0:
+            begin = self._books()
         guess = self._next_guess()
-        for _ in range(200):
-            target = min(guess, limit)
-            if self._walk(target, upward=True):
+        while guess <= 1e30 or limit < LARGE:
+            if self._walk(min(guess, limit), upward=True) or self.time >= limit:
                 return True
-            if self.time >= limit:
-                return True
+            if begin is None or len(self.history) > rows:
+                begin, rows = self._books(), len(self.history)
             guess = max(2.0 * self.time, self._next_guess())
-            if guess > 1e30 and limit >= LARGE:
-                return False
+        self._undo(begin)
         return False
 
     def _only_round_off(self) -> bool:
@@ -313,15 +326,24 @@ class March(Account):
             upper = max(upper, 1.0 + g.unstable_tolerance)
         return upper
 
-    def _may_run_on(self) -> bool:
-        """Whether more nodes may go at this load: within the unstable growth tolerance.
+    def _met_at_start(self) -> list[bool]:
+        """Per interface, whether f is in its window already at the start of an increment.
 
-        Criteria other than energy release rates let nodes go whose f has reached its window at the
-        very start of an increment.
+        That goes for criteria other than energy release rates, right after nodes have let go. The
+        smallest increment is used then, and the nodes go at its end whatever their f is: cutting
+        back could not make it smaller.
         """
+        return [
+            not isinstance(g.criterion, RateCriterion)
+            and bool(v.f.max(initial=0.0) >= g.criterion.window[0])
+            for g, v in zip(self.growths, self._values, strict=True)
+        ]
+
+    def _may_run_on(self) -> bool:
+        """Whether more nodes may go at this load: within the unstable growth tolerance."""
         over = [
             (float(v.f.max(initial=0.0)), g.unstable_tolerance)
             for g, v in zip(self.growths, self._values, strict=True)
-            if v.f.max(initial=0.0) >= 1.0 and isinstance(g.criterion, RateCriterion)
+            if v.f.max(initial=0.0) >= g.criterion.window[0]
         ]
         return all(t is not None and f <= 1.0 + t for f, t in over)
