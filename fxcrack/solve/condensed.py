@@ -149,9 +149,7 @@ class CondensedModel:
         self.timings.add("compile", start)
         start = time.perf_counter()
         self._stiffness = self.continuum.stiffness()
-        self._borders = border_vectors(
-            self.continuum, self.loads, self.monitors, self._followed
-        )
+        self._borders = border_vectors(self.continuum, self.loads, self.monitors, self._followed)
         self.timings.add("assemble", start)
 
     def _choose_window(self) -> JumpCoordinates:
