@@ -146,31 +146,34 @@ class Continuum:
     def load_vector(self, load: Load) -> PETSc.Vec:
         """Nodal forces of a load at amplitude 1; the caller destroys the vector."""
         v = ufl.TestFunction(self.space)
-        meta = {"quadrature_degree": self.degree}
         if isinstance(load, Traction):
-            ds = self._surface(load.where, meta)
+            ds = self.surface(load.where)
             form = ufl.inner(self._vector(load.value, load.title), v) * self.weight * ds
         elif isinstance(load, Pressure):
-            ds = self._surface(load.where, meta)
+            ds = self.surface(load.where)
             normal = ufl.FacetNormal(self.mesh.domain)
-            form = -ufl.inner(self._field(load.value) * normal, v) * self.weight * ds
+            form = -ufl.inner(self.field(load.value) * normal, v) * self.weight * ds
         elif isinstance(load, BodyForce):
             value = self._vector(load.value, load.title)
-            form = ufl.inner(value, v) * self.weight * self._volume(load.where, meta)
+            form = ufl.inner(value, v) * self.weight * self.volume(load.where)
         else:
             return self._point_force(load.where, load.value, load.title)
         vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector
 
-    def _surface(self, where: str, meta: dict[str, int]) -> Any:
+    def surface(self, where: str) -> Any:
+        """UFL measure of a named facet group."""
+        meta = {"quadrature_degree": self.degree}
         facets = self.mesh.group(where, dim=self.mesh.tdim - 1).entities
         marks = dolfinx.mesh.meshtags(
             self.mesh.domain, self.mesh.tdim - 1, facets, np.ones(len(facets), dtype=np.int32)
         )
         return ufl.Measure("ds", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
 
-    def _volume(self, where: str | None, meta: dict[str, int]) -> Any:
+    def volume(self, where: str | None) -> Any:
+        """UFL measure of a named cell group, of the whole mesh for ``None``."""
+        meta = {"quadrature_degree": self.degree}
         if where is None:
             return ufl.dx(self.mesh.domain, metadata=meta)
         cells = self.mesh.group(where, dim=self.mesh.tdim).entities
@@ -179,7 +182,8 @@ class Continuum:
         )
         return ufl.Measure("dx", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
 
-    def _field(self, value: Field) -> Any:
+    def field(self, value: Field) -> Any:
+        """A number as a UFL constant, a function of positions interpolated in each cell."""
         if not callable(value):
             return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
         # points inside the cells: a step at a cell boundary stays a step
@@ -196,7 +200,7 @@ class Continuum:
     def _vector(self, value: tuple[Field, ...], title: str) -> Any:
         if len(value) != self.gdim:
             raise InputError(f"load '{title}': {len(value)} components given, {self.gdim} needed")
-        return ufl.as_vector([self._field(v) for v in value])
+        return ufl.as_vector([self.field(v) for v in value])
 
     def _point_force(self, where: str, value: tuple[float, ...], title: str) -> PETSc.Vec:
         if len(value) != self.gdim:

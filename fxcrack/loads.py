@@ -129,19 +129,22 @@ class Traction:
 
 @dataclass(frozen=True)
 class Pressure:
-    """Pressure on a named facet group, positive when it pushes into the body, not following it.
+    """Pressure on a named facet group, positive when it pushes into the body.
 
     Args:
         where: Name of a facet group.
-        value: Force/length^2, a number or a function of position.
+        value: Force/length^2, a number or a function of (undeformed) position.
         amplitude: Factor in time.
         name: What the history calls it.
+        follows: Stay normal to the deformed facets and act on their deformed area, instead of
+            keeping direction and size.
     """
 
     where: str
     value: Field
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
+    follows: bool = False
 
     @property
     def title(self) -> str:

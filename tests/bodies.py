@@ -226,3 +226,10 @@ def uniform(gradient: npt.ArrayLike) -> Callable[[Array], Array]:
     """Displacement G x of a uniform gradient, for :func:`solve`."""
     g = np.asarray(gradient, dtype=float)
     return lambda x: x[:, : len(g)] @ g.T
+
+
+def newton_order(norms: Sequence[float]) -> float:
+    """Order of convergence at the end of an iteration, above round-off."""
+    seen = np.log([n for n in norms if n > 1e-14 * max(norms)])
+    orders = (seen[2:] - seen[1:-1]) / (seen[1:-1] - seen[:-2])
+    return float(orders[-2:].max())

@@ -155,6 +155,21 @@ class Bodies:
             term.commit(self.u)
             self._add(term.name, start)
 
+    def state(self) -> dict[str, Array]:
+        """Committed state of this rank: the displacement and what the terms remember."""
+        out = {"displacement": self.u.x.array.copy()}
+        for i, term in enumerate(self.terms):
+            out |= {f"{i}.{key}": value for key, value in term.state().items()}
+        return out
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state` of the same mesh, ranks and terms."""
+        self.u.x.array[:] = state["displacement"]
+        for i, term in enumerate(self.terms):
+            start = f"{i}."
+            term.restore({k[len(start) :]: v for k, v in state.items() if k.startswith(start)})
+            term.update(self.u)
+
     def destroy(self) -> None:
         """Free PETSc objects; collective."""
         if self._matrix is not None:
