@@ -10,9 +10,7 @@ its own:  python -m fxcrack.bench.measure dcb2d 0.0625 0.125 32
 from __future__ import annotations
 
 import json
-import os
 import resource
-import shutil
 import subprocess
 import sys
 import time
@@ -24,6 +22,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack
+from fxcrack import processes
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.errors import SolverError
 from fxcrack.interface.jumps import HELD, INNER, build_coordinates
@@ -34,9 +33,6 @@ from fxcrack.solve.petsc_schur import mumps_message
 
 _WORKSPACE = 40  # per cent more than MUMPS estimates (ICNTL(14)), as in the condensation
 _CHILD_LIMIT = 1800.0  # seconds
-# what a launcher tells its processes must not reach the processes of another launcher
-_LAUNCHER = ("PMI", "HYD", "MPIR_", "MPICH_", "OMPI_", "PRTE_", "OPAL_", "ORTE_", "MPI_LOCAL")
-_KEPT = ("OMPI_MCA_btl", "OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM")
 
 
 def peak_memory(comm: MPI.Intracomm) -> float:
@@ -215,21 +211,13 @@ def memory_of_one_solve(problem: Problem, comm: MPI.Intracomm) -> float | None:
 
 
 def _in_own_processes(problem: Problem, ranks: int) -> float | None:
-    command = [sys.executable, "-m", __name__]
-    command += [problem.name, str(problem.dx), str(problem.dy), str(problem.ny)]
-    if ranks > 1:
-        near = Path(sys.executable).parent / "mpiexec"
-        launcher = str(near) if near.exists() else shutil.which("mpiexec")
-        if launcher is None:
-            return None
-        command = [launcher, "-n", str(ranks), *command]
-    environment = {k: v for k, v in os.environ.items() if k in _KEPT or not k.startswith(_LAUNCHER)}
-    # more ranks than cores are allowed, also in Open MPI (4 and 5)
-    environment["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
-    environment["PRTE_MCA_rmaps_default_mapping_policy"] = ":oversubscribe"
+    words = [problem.name, str(problem.dx), str(problem.dy), str(problem.ny)]
+    command = processes.command(__name__, words, ranks)
+    if command is None:
+        return None
     try:
         run = subprocess.run(
-            command, env=environment, capture_output=True, text=True, check=True,
+            command, env=processes.environment(), capture_output=True, text=True, check=True,
             timeout=_CHILD_LIMIT, stdin=subprocess.DEVNULL,
         )  # fmt: skip
         return float(json.loads(run.stdout.splitlines()[-1])["memory"])
