@@ -1,4 +1,4 @@
-"""Command line: ``fxcrack demo``, ``fxcrack bench``, ``fxcrack info``.
+"""Command line: ``fxcrack demo``, ``fxcrack bench``, ``fxcrack accuracy``, ``fxcrack info``.
 
 The same words run under mpirun: rank 0 prints, and an error ends all ranks. Bad input, found on
 all ranks together, is one short message and exit code 1; wrong words are exit code 2. Any other
@@ -125,6 +125,50 @@ def bench(
     if json_file is not None and MPI.COMM_WORLD.rank == 0:
         with replacing(json_file) as temporary:
             temporary.write_text(json.dumps(result, indent=1) + "\n")
+
+
+# -- accuracy ------------------------------------------------------------------------
+
+
+@app.command()
+def accuracy(
+    scene: Annotated[
+        str,
+        typer.Argument(
+            help="dcb, enf, mmb, penny, fatigue_dcb, or path/to/file.py:function, or "
+            "package.module:function."
+        ),
+    ],
+    budget: Annotated[float, typer.Option(help="Seconds all runs together may take.")] = 60.0,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for results.", show_default="out/accuracy/SCENE")
+    ] = None,
+    sizes: Annotated[
+        str | None, typer.Option(help="Element sizes instead of the study's, e.g. 1,0.5,0.25.")
+    ] = None,
+    measure: Annotated[
+        str, typer.Option(help="Quantity whose error counts: load, G, length or another measured.")
+    ] = "worst",
+) -> None:
+    """Measure what accuracy costs in time, and advise the cheapest setting for 5, 1 and 0.1 %."""
+    from fxcrack.accuracy import report
+    from fxcrack.accuracy.run import run
+
+    if MPI.COMM_WORLD.size > 1:
+        raise InputError(
+            "fxcrack accuracy starts processes of its own, on several ranks where it needs them; "
+            "call it without mpirun"
+        )
+    try:
+        chosen = [float(word) for word in sizes.split(",")] if sizes else []
+    except ValueError:
+        raise InputError(f"--sizes {sizes}: give numbers with commas, e.g. 1,0.5,0.25") from None
+    console = _console()
+    result = run(scene, budget=budget, sizes=chosen, measure=measure, tell=console.print)
+    report.show(result, console)
+    name = scene.rpartition(":")[2]
+    files = report.write(result, Path("out") / "accuracy" / name if out is None else out)
+    console.print(f"files: {', '.join(str(f) for f in files)}")
 
 
 # -- information ---------------------------------------------------------------------

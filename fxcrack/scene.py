@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack import log
+from fxcrack.accuracy.estimate import as_details, check_accuracy, demand
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface, make_pair
@@ -73,6 +74,11 @@ class Scene:
                     "different names to different interfaces"
                 )
         self.mesh = mesh
+        self.parts: dict[str, Any] = {
+            "materials": materials, "model": model, "supports": supports, "loads": loads,
+            "debonds": debonds, "bonds": bonds, "monitors": monitors, "order": order,
+            "options": options,
+        }  # fmt: skip
         self.debonds = list(debonds)
         self.continuum = Continuum(mesh, materials, model, order=order)
         self.pairs = [make_pair(self.continuum, i) for i in interfaces]
@@ -115,6 +121,7 @@ class Scene:
         grow: Sequence[Debond] | None = None,
         progress: bool = True,
         observers: Sequence[Observer] = (),
+        accuracy: float | None = None,
     ) -> History:
         """Run a step and return the history of all steps so far; collective.
 
@@ -124,7 +131,16 @@ class Scene:
             progress: Show load, crack length and f while running (on a terminal only).
             observers: Called on all ranks with the name of every event and its row of the
                 history, e.g. :class:`fxcrack.output.fields.FieldSeries`.
+            accuracy: Relative error that load and G may have for the mesh's and the increments'
+                sake. After the run it is estimated from a second solution to the first onset (see
+                :mod:`fxcrack.accuracy.estimate`), which is kept in ``history.details``.
+
+        Raises:
+            AccuracyError: The accuracy is not reached, or cannot be judged; says what would reach
+                it. The history is kept.
         """
+        if accuracy is not None:
+            check_accuracy(accuracy)
         chosen = self.debonds if grow is None else list(grow)
         for debond in chosen:
             if debond not in self.debonds:
@@ -188,6 +204,8 @@ class Scene:
         }
         if self.fatigue.table["N"]:
             self.history.details["tips"] = self.fatigue.table
+        if accuracy is not None:
+            self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
         return self.history
 
     def _march(self, growths: list[Growth], step: Static | Cycles, **carried: Any) -> March:

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fxcrack.accuracy.study import Setting
 
 _GUESS = 1.2
-"""Exponent of the cost in the unknowns while too little is known: between assembly and 3-D factor."""
+"""Exponent of the cost in the unknowns while too little is known."""
 _POSSIBLE = (0.8, 1.8)
 """Exponents outside are noise or overheads: large problems cost between n and n^1.8."""
 _FIRST = 0.5

@@ -14,6 +14,12 @@ Box = tuple[float, float, float, float]
 _ANGLES = np.radians(np.arange(0, 360, 15))
 _PREFERRED = np.radians(215.0)  # below a falling front and left of it nothing else is drawn
 _DISTANCES = (12.0, 20.0, 32.0, 48.0, 68.0, 92.0, 120.0, 160.0)
+_CANDIDATES = sorted(
+    (0.25 * distance + 4.0 * (1.0 - float(np.cos(angle - _PREFERRED))), distance, float(angle))
+    for distance in _DISTANCES
+    for angle in _ANGLES
+)
+"""How little each place beside an anchor is liked, distance, angle; the best first."""
 _GAP = 3.0
 
 
@@ -53,16 +59,16 @@ def place(
     placed: list[Box] = []
     leaders: list[tuple[Array, Array]] = []
     for anchor, (width, height) in zip(anchors, sizes, strict=True):
-        best: tuple[float, Box] | None = None
-        for distance in _DISTANCES:
-            for angle in _ANGLES:
-                box = _beside(anchor, width, height, angle, distance * scale)
-                cost = _cost(box, anchor, distance, angle, bounds, placed, boxes, spots, leaders)
-                if best is None or cost < best[0]:
-                    best = (cost, box)
-        assert best is not None
-        placed.append(best[1])
-        leaders.append((np.asarray(anchor, dtype=float), nearest(best[1], anchor)))
+        least, best = np.inf, (0.0, 0.0, 0.0, 0.0)
+        for taste, distance, angle in _CANDIDATES:
+            if taste >= least:
+                break  # what comes now is no better even if it covers nothing
+            box = _beside(anchor, width, height, angle, distance * scale)
+            cost = taste + _trouble(box, anchor, bounds, [*placed, *boxes], spots, leaders)
+            if cost < least:
+                least, best = cost, box
+        placed.append(best)
+        leaders.append((np.asarray(anchor, dtype=float), nearest(best, anchor)))
     return placed
 
 
@@ -79,28 +85,24 @@ def _beside(anchor: Array, width: float, height: float, angle: float, distance: 
     return (x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
 
 
-def _cost(
+def _trouble(
     box: Box,
     anchor: Array,
-    distance: float,
-    angle: float,
     bounds: Box,
-    placed: Sequence[Box],
-    boxes: Sequence[Box],
+    taken: Sequence[Box],
     spots: Sequence[Box],
     leaders: Sequence[tuple[Array, Array]],
 ) -> float:
+    """What a box would cover or cross, weighed."""
     wide = (box[0] - _GAP, box[1] - _GAP, box[2] + _GAP, box[3] + _GAP)
     area = (box[2] - box[0]) * (box[3] - box[1])
-    outside = area - overlap(box, bounds)
-    cost = 1e3 * outside / area
-    cost += sum(1e3 for other in (*placed, *boxes) if overlap(wide, other) > 0.0)
-    cost += sum(60.0 for spot in spots if overlap(box, spot) > 0.0)
+    trouble = 1e3 * (area - overlap(box, bounds)) / area
+    trouble += sum(1e3 for other in taken if overlap(wide, other) > 0.0)
+    trouble += sum(60.0 for spot in spots if overlap(box, spot) > 0.0)
     leader = (np.asarray(anchor, dtype=float), nearest(box, anchor))
     for a, b in leaders:
-        cost += 200.0 * _crosses(leader, (a, b)) + 300.0 * _hits(wide, a, b)
-    cost += sum(300.0 for other in placed if _hits(other, *leader))
-    return cost + 0.25 * distance + 4.0 * (1.0 - np.cos(angle - _PREFERRED))
+        trouble += 200.0 * _cross(leader, (a, b)) + 300.0 * _hits(wide, a, b)
+    return float(trouble + sum(300.0 for other in taken if _hits(other, *leader)))
 
 
 def _hits(box: Box, a: Array, b: Array) -> bool:
@@ -112,7 +114,7 @@ def _hits(box: Box, a: Array, b: Array) -> bool:
     return False
 
 
-def _crosses(one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
+def _cross(one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
     """Whether two segments cross."""
 
     def side(a: Array, b: Array, p: Array) -> float:

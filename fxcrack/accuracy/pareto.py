@@ -1,6 +1,7 @@
 """Which settings are worth their time, and what to advise: pure functions.
 
-A setting is on the Pareto front if none is both as fast and as accurate, and better in one of them.
+A setting is on the Pareto front if none is as fast and as accurate. Accuracies that differ by less
+than a few per cent count as the same: differences in round-off make no front.
 """
 
 from __future__ import annotations
@@ -10,11 +11,13 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+GAIN = 0.03
+"""Share of the error that a dearer setting must save to be on the front."""
 TARGETS = (0.05, 0.01, 0.001)
 """Accuracies for which the cheapest setting is named."""
 
 
-def pareto_front(seconds: npt.ArrayLike, errors: npt.ArrayLike) -> list[int]:
+def pareto_front(seconds: npt.ArrayLike, errors: npt.ArrayLike, *, gain: float = GAIN) -> list[int]:
     """Positions of the points that no other point beats, fastest first.
 
     Of points equal in both the first one is taken. Points that are not finite are left out.
@@ -22,12 +25,13 @@ def pareto_front(seconds: npt.ArrayLike, errors: npt.ArrayLike) -> list[int]:
     Args:
         seconds: Cost of each point, shape (n,).
         errors: Error of each point, shape (n,).
+        gain: Share of the error that a dearer point must save.
     """
     t, e = np.asarray(seconds, dtype=float), np.asarray(errors, dtype=float)
     best, out = np.inf, []
     for i in np.lexsort((np.arange(len(t)), e, t)):
         if np.isfinite(t[i]) and np.isfinite(e[i]) and e[i] < best:
-            best = float(e[i])
+            best = float(e[i]) * (1.0 - gain)
             out.append(int(i))
     return out
 
@@ -86,12 +90,9 @@ def advice(
     for i, reached in found:
         words = " and ".join(reached)
         if i is None:
-            best = (
-                f"; the best has {percent(float(np.nanmin(e)))}" if np.any(np.isfinite(e)) else ""
-            )
-            blind = uncertainty >= min(targets)
-            why = " (the reference itself is not known so well)" if blind and not best else ""
-            parts.append(f"none reached {words}{best}{why}")
+            known = np.any(np.isfinite(e))
+            best = f" (the best has {percent(float(np.nanmin(e)))})" if known else ""
+            parts.append(f"none reached {words}{best}")
         else:
             parts.append(f"for {words} use {names[i]} ({duration(float(t[i]))})")
     sentence = "; ".join(parts) + "."

@@ -77,8 +77,7 @@ def error_figure(result: Result) -> Figure:
             alpha=0.6, markeredgewidth=0.0, linestyle="none", zorder=3,
         )  # fmt: skip
     front = result["pareto"]
-    steps = dict(color=INK, linewidth=1.4, zorder=4)
-    ax.step(x[front], y[front], where="post", **steps)
+    ax.step(x[front], y[front], where="post", color=INK, linewidth=1.4, zorder=4)
     for i in front:
         ax.plot(
             x[i], y[i], _MARKERS[_kind(settings[i], settings[0])], color=_colour(settings[i]),
@@ -194,7 +193,7 @@ def _explain(ax: Axes, settings: list[Setting]) -> None:
 
 def _label(figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: Array) -> None:
     """Write a label beside each anchor, with a line to it."""
-    canvas = FigureCanvasAgg(figure)
+    canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     figure.set_layout_engine("none")  # the places found below belong to this layout
     renderer = canvas.get_renderer()
@@ -212,12 +211,12 @@ def _label(figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: A
         scale=figure.dpi / 100.0,
     )  # fmt: skip
     back = ax.transAxes.inverted()
-    for anchor, box, text in zip(at, placed, texts, strict=True):
-        middle = back.transform((0.5 * (box[0] + box[2]), 0.5 * (box[1] + box[3])))
-        ends = back.transform(np.array([anchor, nearest(box, anchor)]))
+    for anchor, where, words in zip(at, placed, texts, strict=True):
+        x, y = back.transform((0.5 * (where[0] + where[2]), 0.5 * (where[1] + where[3])))
+        ends = back.transform(np.array([anchor, nearest(where, anchor)]))
         ax.plot(*ends.T, color=GREY, linewidth=0.7, transform=ax.transAxes, zorder=4.5)
         ax.text(
-            *middle, text, fontsize=8.5, color=INK, ha="center", va="center",
+            x, y, words, fontsize=8.5, color=INK, ha="center", va="center",
             transform=ax.transAxes, zorder=6,
         )  # fmt: skip
 

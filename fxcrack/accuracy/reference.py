@@ -1,8 +1,8 @@
 """What errors are counted from: an exact closed form, or what the study's own finest runs tend to.
 
 The second needs no theory: on each line of settings that differ in size alone, the values are
-extrapolated to size zero, v(h) = v0 + c h^p. The line with the smallest correction is the reference,
-and how far the next best lines are from it says how well it is known.
+extrapolated to size zero, v(h) = v0 + c h^p. The line with the smallest correction is the
+reference, and how far the next best lines are from it says how well it is known.
 """
 
 from __future__ import annotations

@@ -31,6 +31,7 @@ Tell = Callable[[str], None]
 
 _PATIENCE = 4.0  # a setting may take so many times its predicted seconds,
 _START = 4.0  # seconds a new worker is thought to take
+_NEAR = 0.5  # seconds to the end of the budget that are not worth starting for
 _AT_LEAST = 10.0  # or so many seconds, but not more than the budget has left
 _FIT_POINTS = 4  # the largest problems of a line tell the exponents
 _FIT_RANGE = 1.5  # in log10 of the unknowns below the largest
@@ -124,6 +125,10 @@ class _Session:
                 try:
                     found = workers.run(setting, limit)
                 except SettingFailed as error:
+                    if isinstance(error, TookTooLong) and self.wall >= self._budget - _NEAR:
+                        self.waiting.append(setting)
+                        self._tell(f"{setting}: not done before the end of the budget")
+                        return
                     self._fail(setting, error)
                     continue
                 self.done[setting] = found["seconds"]

@@ -40,7 +40,7 @@ Array = npt.NDArray[np.float64]
 def _bond(start: float, *, contact: bool = False) -> Interface:
     """The interface "bond" of two arms, bonded from x = start on."""
 
-    def bonded(x: Array) -> npt.NDArray[np.bool_]:
+    def bonded(x: Array) -> Array:
         return np.asarray(x[0] >= start * (1.0 - 1e-9))
 
     return Interface(

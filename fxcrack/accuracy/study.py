@@ -273,8 +273,8 @@ def along(rows: list[Row], at: str, value: float, column: str) -> float:
     near = 1e-9 * max(abs(x[0]), abs(x[-1]))
     if not x[0] - near <= value <= x[-1] + near:
         raise InputError(
-            f"{at} runs from {x[0]:.6g} to {x[-1]:.6g} and does not reach {value:.6g}; run the step "
-            "further, or ask for another value"
+            f"{at} runs from {x[0]:.6g} to {x[-1]:.6g} and does not reach {value:.6g}; run the "
+            "step further, or ask for another value"
         )
     return float(np.interp(value, x, y))
 

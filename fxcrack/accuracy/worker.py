@@ -1,4 +1,6 @@
-"""The process in which settings run, one at a time:  python -m fxcrack.accuracy.worker SCENE
+"""The process in which settings run, one at a time.
+
+    python -m fxcrack.accuracy.worker SCENE
 
 It reads a setting per line as JSON, and answers with one line that begins with :data:`MARK`. On
 several ranks rank 0 reads and writes. Seconds are those of the slowest rank, from calling the scene

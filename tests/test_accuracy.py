@@ -1,0 +1,240 @@
+"""Accuracy studies from end to end, and runs that are asked for an accuracy."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import fxcrack as fx
+from fxcrack import cli
+from fxcrack.accuracy import AccuracyError, Setting, choose
+from fxcrack.accuracy.launch import SettingFailed, TookTooLong, Workers
+from fxcrack.accuracy.load import load
+from fxcrack.accuracy.run import run
+from fxcrack.accuracy.scenes import STUDIES
+from fxcrack.errors import InputError
+
+OWN = """
+from fxcrack.accuracy import Case, Measured, Setting, study
+from fxcrack.accuracy.scenes import STUDIES
+
+@study(sizes=(2.0, 1.0), orders=(1,), cells=("quadrilateral",), methods=("vcct",))
+def mine(setting: Setting) -> Case:
+    return STUDIES["dcb"](setting)
+
+@study(sizes=(0.4, 0.2, 0.1), cells=("quadrilateral",), methods=("vcct",))
+def disc(setting: Setting) -> Case:
+    return STUDIES["penny"](setting)
+
+def plain(setting: Setting) -> Case:
+    return mine(setting)
+
+def stuck(setting: Setting) -> Case:
+    import time
+    time.sleep(60.0)
+
+def wrong(setting: Setting) -> Case:
+    raise ZeroDivisionError("by design")
+"""
+
+
+@pytest.fixture
+def own(tmp_path: Path) -> str:
+    """A file with scene functions of a user's own."""
+    path = tmp_path / "own_scenes.py"
+    path.write_text(OWN)
+    return str(path)
+
+
+# -- studies -------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_tiny_study_of_a_users_own_scene(own: str, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    words = ["accuracy", f"{own}:mine", "--budget", "20", "--out", str(out)]
+    command = [sys.executable, "-c", "from fxcrack.cli import main; main()", *words]
+    found = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+    result = json.loads((out / "accuracy.json").read_text())
+    assert [r["setting"]["size"] for r in result["records"]] == [2.0, 1.0]
+    assert result["advice"] in " ".join(found.stdout.split())
+    assert not result["reference"]["exact"]
+    assert "own finest runs" in result["reference"]["source"]
+    assert result["theory"]["source"] == "corrected beam theory"
+    for record in result["records"]:
+        assert record["seconds"] > 0.0
+        assert sum(record["phases"].values()) == pytest.approx(record["seconds"], rel=1e-6)
+        assert set(record["memory"]) == {"setup", "factor", "growth"}
+        assert set(record["errors"]) == {"load", "G", "length"}
+    assert result["machine"]["fxcrack"] == fx.__version__
+    assert {p.name for p in out.iterdir()} == {
+        "accuracy.json", "accuracy.md", "error.png", "cost.png",
+    }  # fmt: skip
+    # what was measured can be used, and is not stretched
+    setting = choose(out / "accuracy.json", 0.3)
+    assert setting.size in (1.0, 2.0)
+    with pytest.raises(AccuracyError, match="the best reached"):
+        choose(out / "accuracy.json", 1e-9)
+    with pytest.raises(InputError, match="no result of fxcrack accuracy"):
+        choose(own, 0.01)
+
+
+@pytest.mark.slow
+def test_nothing_hangs_and_a_failure_does_not_end_the_study(own: str) -> None:
+    setting = Setting(size=2.0)
+    begin = time.monotonic()
+    with Workers(f"{own}:stuck") as workers, pytest.raises(TookTooLong, match="time limit"):
+        workers.run(setting, 5.0)
+    assert time.monotonic() - begin < 20.0
+    with Workers(f"{own}:wrong") as workers:
+        for ranks in (1, 2):
+            with pytest.raises(SettingFailed, match="ZeroDivisionError: by design"):
+                workers.run(replace(setting, ranks=ranks), 30.0)
+    with pytest.raises(InputError, match=r"no setting gave a result.*ZeroDivisionError"):
+        run(f"{own}:wrong", budget=10.0, sizes=(2.0,))
+
+
+def test_names_that_name_nothing_are_refused(own: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="fatigue_dcb"):
+        load("dbc")
+    with pytest.raises(InputError, match="no file"):
+        load(str(tmp_path / "none.py") + ":f")
+    with pytest.raises(InputError, match="cannot be imported"):
+        load("no.such.module:f")
+    with pytest.raises(InputError, match="no function 'f'"):
+        load(f"{own}:f")
+    assert load(f"{own}:plain").title == "plain"
+    with pytest.raises(InputError, match="budget = 0"):
+        run("dcb", budget=0.0)
+    with pytest.raises(SystemExit):
+        cli.main(["accuracy", "dcb", "--sizes", "fine"])
+
+
+@pytest.mark.slow
+@pytest.mark.convergence
+def test_what_a_study_says_of_the_penny_shaped_crack_is_true(own: str) -> None:
+    budget = 30.0  # six runs of a tenth of a second each; Python may take long to start
+    result = run(f"{own}:disc", budget=budget)
+    assert result["wall"] < budget + 5.0  # ending the workers included
+    assert result["reference"]["exact"]
+    assert len(result["records"]) == 6
+    records = {Setting(**r["setting"]): r for r in result["records"]}
+    base = [records[Setting(size=h)]["error"] for h in (0.4, 0.2, 0.1)]
+    # bilinear quads: the energy release rate converges with the square of the size
+    assert base[0] / base[1] > 2.5
+    assert base[1] / base[2] > 2.5
+    # every advice holds: the record reaches the target, and nothing faster does
+    for target in result["targets"]:
+        good = [r for r in result["records"] if r["error"] <= target["target"]]
+        if target["record"] is None:
+            assert not good
+        else:
+            chosen = result["records"][target["record"]]
+            assert chosen["error"] <= target["target"]
+            assert chosen["seconds"] == min(r["seconds"] for r in good)
+
+
+# -- an accuracy asked for -----------------------------------------------------------
+
+
+def _case(name: str, **choices: Any) -> Any:
+    return STUDIES[name](Setting(**choices))
+
+
+@pytest.mark.mpi
+def test_a_run_that_is_accurate_enough_says_how_it_knows() -> None:
+    case = _case("penny", size=0.2)
+    history = case.scene.run(case.step, accuracy=0.05, progress=False)
+    found = history.details["accuracy"]
+    # the true errors on this mesh: load 0.51 %, G 1.02 %
+    assert 0.0051 < found["load"] < 0.05
+    assert 0.0102 < found["G"] < 0.05
+    assert "second-order solution" in found["words"]
+    case.scene.close()
+
+
+@pytest.mark.mpi
+def test_a_run_that_is_not_accurate_enough_says_so_and_what_to_do() -> None:
+    case = _case("penny", size=0.4)
+    with pytest.raises(AccuracyError, match=r"1 % is not reached.*elements of at most") as error:
+        case.scene.run(case.step, accuracy=0.01, progress=False)
+    assert error.value.estimate is not None
+    assert error.value.estimate.total > 0.01
+    assert len(case.scene.history) > 2  # nothing is lost
+    case.scene.close()
+
+
+def test_increments_count_as_errors() -> None:
+    case = _case("penny", size=0.2, stepping="increment", tolerance=0.2)
+    with pytest.raises(AccuracyError, match="stepping='event' or a tolerance") as error:
+        case.scene.run(case.step, accuracy=0.04, progress=False)
+    assert error.value.estimate is not None
+    excess = max(float(r["f[bond]"]) for r in case.scene.history if r["event"] == "increment")
+    assert error.value.estimate.stepping == pytest.approx(excess**0.5 - 1.0)
+    # the mesh alone would do: what it is off by does not depend on the stepping
+    assert error.value.estimate.total - error.value.estimate.stepping < 0.04
+    case.scene.close()
+
+
+def test_what_cannot_be_judged_is_said() -> None:
+    case = _case("penny", size=0.4)
+    with pytest.raises(AccuracyError, match="nothing grew"):
+        case.scene.run(fx.Static(until=fx.Time(0.01)), accuracy=0.1, progress=False)
+    with pytest.raises(InputError, match="accuracy = 1"):
+        case.scene.run(case.step, accuracy=1.0)
+    case.scene.close()
+    # data per slave node fit one order only
+    scene = case.scene
+    n = scene.pairs[0].surface.n_nodes
+    bond = scene.debonds[0].interface
+    other = fx.Scene(
+        scene.mesh,
+        **{
+            **scene.parts,
+            "debonds": [fx.Debond(bond, fx.VCCT(GIc=[10.0] * n))],
+        },
+    )
+    with pytest.raises(AccuracyError, match=r"cannot be judged.*fxcrack accuracy"):
+        other.run(case.step, accuracy=0.1, progress=False)
+    other.close()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "size", "load", "rate"),
+    [
+        # true errors of load at onset and G, in per cent, from the extrapolated finest runs of
+        # fxcrack accuracy NAME
+        ("dcb", 0.5, 0.75, 2.9),
+        ("enf", 0.5, 1.3, 1.1),
+        ("mmb", 0.5, 0.66, 2.2),
+    ],
+)
+def test_the_estimate_is_not_below_the_true_error_and_not_far_above(
+    name: str, size: float, load: float, rate: float
+) -> None:
+    stepping = STUDIES[name].steppings[0]
+    case = _case(name, size=size, stepping=stepping)
+    history = case.scene.run(case.step, accuracy=0.5, progress=False)
+    found = history.details["accuracy"]
+    assert 0.95 * load < 100.0 * found["load"] < 3.0 * load
+    assert 0.95 * rate < 100.0 * found["G"] < 3.0 * rate
+    case.scene.close()
+
+
+def test_cycles_feel_the_power_of_the_law() -> None:
+    case = _case("fatigue_dcb", size=0.5, method="closure")
+    with pytest.raises(AccuracyError, match="number of cycles") as error:
+        case.scene.run(case.step, accuracy=0.05, progress=False)
+    estimate = error.value.estimate
+    assert estimate is not None
+    assert estimate.cycles is not None
+    assert estimate.cycles > 5.0 * estimate.G
+    case.scene.close()
