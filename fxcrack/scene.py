@@ -11,6 +11,7 @@ import numpy.typing as npt
 from fxcrack import log
 from fxcrack.accuracy.estimate import as_details, check_accuracy, demand
 from fxcrack.continuum import Continuum
+from fxcrack.effects import Effect, form_terms, plan
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports
@@ -21,6 +22,7 @@ from fxcrack.models import Model
 from fxcrack.output.history import History, Row
 from fxcrack.output.progress import Progress
 from fxcrack.solve.condensed import CondensedModel, CondensedOptions
+from fxcrack.solve.newton import NewtonOptions
 from fxcrack.steps.cycle_march import CycleMarch
 from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
 from fxcrack.steps.growth import Debond, Growth
@@ -46,6 +48,10 @@ class Scene:
         monitors: Displacements to watch.
         order: Order of the displacement; that of the mesh by default.
         options: How the continuum is condensed.
+        effects: What the bodies do beyond small linear elasticity.
+        path: "newton" sends a scene without such effects through the nonlinear solver all the
+            same; by default the effects decide.
+        newton: Controls of the nonlinear solver, where it is used.
 
     Raises:
         InputError: The parts contradict each other; the message says which and how to mend it.
@@ -64,6 +70,9 @@ class Scene:
         monitors: Sequence[Monitor] = (),
         order: int | None = None,
         options: CondensedOptions | None = None,
+        effects: Sequence[Effect] = (),
+        path: str | None = None,
+        newton: NewtonOptions | None = None,
     ) -> None:
         interfaces = [d.interface for d in debonds] + list(bonds)
         titles = [i.title for i in interfaces]
@@ -84,14 +93,22 @@ class Scene:
         self.pairs = [make_pair(self.continuum, i) for i in interfaces]
         self.supports = collect_supports(self.continuum, list(supports))
         self.loads = list(loads)
-        self.model = CondensedModel(
-            self.continuum,
-            self.pairs,
-            self.supports,
-            self.loads,
-            list(monitors),
-            options or CondensedOptions(),
-        )
+        self.effects = list(effects)
+        self.plan = plan(self.effects, path)
+        parts = self.continuum, self.pairs, self.supports, self.loads, list(monitors)
+        self.model: CondensedModel
+        if self.plan.path == "condensed":
+            self.model = CondensedModel(*parts, options or CondensedOptions())
+        else:
+            from fxcrack.solve.newton_model import NewtonModel  # only scenes that need it pay
+            from fxcrack.terms.bodies import Bodies
+
+            self.model = NewtonModel(
+                *parts,
+                options or CondensedOptions(rows=0.0),
+                bodies=Bodies(self.continuum, form_terms(self.continuum, self.effects)),
+                newton=newton or NewtonOptions(),
+            )
         self.growths: list[Growth] = []
         self.time = 0.0
         self._work = 0.0
@@ -162,8 +179,7 @@ class Scene:
                 )
         self.model.prepare(active, self._reach(step))
         if not self._started:
-            zero = np.zeros(self.model.system.n_window)
-            self.model.state = self.model.system.equilibrium(np.zeros(self.model.n_loads), zero)
+            self.model.start()
             at_start = self.loads_at(0.0)
             if np.any(at_start):
                 self._jump_to(at_start)
@@ -210,6 +226,10 @@ class Scene:
 
     def _march(self, growths: list[Growth], step: Static | Cycles, **carried: Any) -> March:
         common = self.history, self.loads_at, self._breaks()
+        if self.plan.path == "newton":
+            from fxcrack.steps.newton_march import NewtonMarch
+
+            return NewtonMarch(self.model, growths, step, *common, **carried)
         if isinstance(step, Cycles):
             carried["fatigue"] = self.fatigue
             return CycleMarch(self.model, growths, step, *common, **carried)

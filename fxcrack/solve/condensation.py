@@ -156,9 +156,11 @@ class Condensation:
         timings: Where seconds and factorisations are counted.
         method: "schur" takes S out of MUMPS, "columns" builds it by block solves, "auto" takes
             the first where it can.
+        definite: Whether the inner block must be positive definite.
 
     Attributes:
         schur: S, shape (n_last, n_last), the same on every rank.
+        n_negative: Negative pivots of the inner block, where it need not be definite.
         borders_on_window: See :func:`bordered_matrix`.
     """
 
@@ -170,11 +172,14 @@ class Condensation:
         timings: Timings,
         *,
         method: str = "auto",
+        definite: bool = True,
     ) -> None:
         if method not in ("auto", "schur", "columns"):
             raise InputError(f"method = '{method}': choose 'auto', 'schur' or 'columns'")
         self.coordinates = coordinates
         self.timings = timings
+        self.n_negative = 0
+        self._definite = definite
         self._comm = stiffness.getComm().tompi4py()
         self._factor: SchurFactor | None = None
         self._inner: PETSc.KSP | None = None
@@ -185,8 +190,12 @@ class Condensation:
         start = time.perf_counter()
         if method == "schur" or (method == "auto" and library() is not None):
             self._factor = SchurFactor(
-                self.matrix, coordinates.n_last, gdim=stiffness.getBlockSize()
+                self.matrix,
+                coordinates.n_last,
+                gdim=stiffness.getBlockSize(),
+                definite=definite,
             )
+            self.n_negative = self._factor.n_negative
             timings.factorizations += 1
             self.schur = self._factor.schur
         else:
@@ -210,7 +219,7 @@ class Condensation:
             inner, last = self._rows()
             block = self.matrix.createSubMatrix(inner, inner)
             block.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-            block.setOption(PETSc.Mat.Option.SPD, True)
+            block.setOption(PETSc.Mat.Option.SPD, self._definite)
             if PETSc.Sys.hasExternalPackage("mumps"):
                 solver = self._mumps_solver(block)
             else:
@@ -242,8 +251,11 @@ class Condensation:
             factor = solver.getPC().getFactorMatrix()
             factor.setMumpsIcntl(14, extra)
             solver.setUp()
-            problem = factor_problem(factor.getMumpsInfog, factor.getMumpsRinfog)
+            problem = factor_problem(
+                factor.getMumpsInfog, factor.getMumpsRinfog, definite=self._definite
+            )
             if problem is None:
+                self.n_negative = factor.getMumpsInfog(12)
                 return solver
             enough = factor.getMumpsInfog(1) not in TOO_SMALL
             solver.destroy()

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,7 +26,7 @@ from fxcrack.interface.supports import Supports
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
-from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
+from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work, work_between
 from fxcrack.solve.petsc_schur import mumps_message
 from fxcrack.solve.rigid import check_held
 from fxcrack.solve.softening import SoftBond
@@ -263,6 +264,11 @@ class CondensedModel:
             np.zeros(self.n_loads),
         )
 
+    def start(self) -> None:
+        """Find the equilibrium without loads; collective."""
+        zero = np.zeros(self.system.n_window)
+        self.state = self.system.equilibrium(np.zeros(self.n_loads), zero)
+
     def solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_window,)."""
         self.state = self.system.equilibrium(self.state.loads, force)
@@ -431,7 +437,7 @@ class CondensedModel:
             self._let_touch(self.pairs[p], self.fronts[p], self.index[p])
         self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 
-    def release(self, p: int, nodes: Ints, force: Array) -> float:
+    def release(self, p: int, nodes: Ints, force: Array) -> tuple[float, float]:
         """Let nodes go at constant load and find the new equilibrium.
 
         Args:
@@ -440,18 +446,39 @@ class CondensedModel:
             force: Given forces afterwards, shape (n_window,).
 
         Returns:
-            Energy set free by the bond forces on their way.
+            Energy set free by the bond forces on their way, and external work.
 
         Raises:
             NotPositiveDefinite: A body would come free; nothing is changed.
         """
         self.open(p, nodes)
-        released, last = 0.0, self.state
+        released, work, last = 0.0, 0.0, self.state
         for _, point in self.system.pieces(last, last.loads, force):
-            released += bond_work(last, point)
+            more, out, _ = self.along(last, point)
+            work, released = work + more, released + out
             last = point
         self.state = last
-        return released
+        return released, work
+
+    def accept(self) -> None:
+        """The present state is good; linear bodies remember nothing else."""
+
+    def remember(self) -> Any:
+        """What :meth:`recall` needs to return to the present state, with the same bonds."""
+        return self.system.snapshot()
+
+    def recall(self, saved: Any) -> None:
+        """Return to an earlier state; ``state`` itself is the caller's to set before."""
+        self.system.restore(saved)
+
+    def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
+        """External work, energy out through bonds, mean jumps of a linear piece."""
+        work = work_between(here, point, len(self.loads))
+        return work, bond_work(here, point), 0.5 * (here.jump + point.jump)
+
+    def strain_energy(self, state: Equilibrium) -> float:
+        """Energy stored in the bodies."""
+        return self.system.strain_energy(state)
 
     # -- displacements that criteria follow ----------------------------------------------
 

@@ -127,7 +127,7 @@ class JumpSystem(LinearJumps):
                     raise ConvergenceError(
                         f"{len(self.soft.bonds)} softening bonds stay unstable at one load"
                     )
-                last = self._pass_unstable(last)
+                last = self.pass_unstable(last)
                 yield here, last
                 continue
             end = self.linear(loads, force)
@@ -157,7 +157,7 @@ class JumpSystem(LinearJumps):
             self.contact_steps += len(changing) > 0
             self._switch(changing)
             if at_soft <= step + 1e-12:
-                self._finish([b for b in leaving if self.soft.switch(b, point.jump)])
+                self.finish([b for b in leaving if self.soft.switch(b, point.jump)])
             here, last = at, point
 
     def _settle(self, last: Equilibrium, loads: Array, force: Array) -> bool:

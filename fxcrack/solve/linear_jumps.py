@@ -117,6 +117,35 @@ class LinearJumps:
         self.release(free)
         self.soft.renew(schur, bonds, self.cholesky)
 
+    def renew(self, schur: Array, offset: Array) -> None:
+        """Take the tangent at another state of the continuum; the states stay as they are.
+
+        Raises:
+            NotPositiveDefinite: The free components have no stable equilibrium with it.
+        """
+        free, bonds, old = self.cholesky.free, self.soft.bonds, (self.schur, self.offset)
+        try:
+            self._take(schur, offset, free, bonds)
+        except NotPositiveDefinite:
+            self._take(*old, free, bonds)
+            raise
+
+    def _take(self, schur: Array, offset: Array | None, free: Ints, bonds: list[SoftBond]) -> None:
+        self.schur, self.offset = schur, offset
+        self.cholesky = GrowingCholesky(schur)
+        self._forward = np.zeros((0, len(self.load_columns) + (offset is not None)))
+        self._unit = None
+        self.soft.bonds = []
+        self.free[:] = False
+        self.release(free)
+        self.soft.renew(schur, bonds, self.cholesky)
+
+    def knows_force(self) -> Bools:
+        """Components whose force the interface laws give, shape (n_window,)."""
+        known = self.free | self.contact
+        known[self.soft.components] = True
+        return known
+
     # -- states --------------------------------------------------------------------------
 
     def release(self, components: Ints) -> None:
@@ -143,7 +172,7 @@ class LinearJumps:
         self.soft.bonds += bonds
         self.soft.refresh(self.cholesky)
 
-    def _finish(self, gone: list[SoftBond]) -> None:
+    def finish(self, gone: list[SoftBond]) -> None:
         """Free bonds that have opened all the way."""
         if not gone:
             return
@@ -288,14 +317,14 @@ class LinearJumps:
         force[mine] = self.soft.forces(soft)
         return force
 
-    def _pass_unstable(self, state: Equilibrium) -> Equilibrium:
+    def pass_unstable(self, state: Equilibrium) -> Equilibrium:
         """Run downhill from an unstable state to the next stable one, at constant load."""
         mine = self.soft.components
         still = state.jump.copy()
         still[self.cholesky.free] += self.cholesky.backward(self.soft.coupling @ state.jump[mine])
         still[mine] = 0.0
         right = self._soft_right(still, state.loads)
-        self._finish(self.soft.snap(right, state.jump[mine]))
+        self.finish(self.soft.snap(right, state.jump[mine]))
         given = state.force.copy()
         given[mine] = 0.0
         return self.linear(state.loads, given)

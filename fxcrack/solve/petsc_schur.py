@@ -55,15 +55,20 @@ class SchurFactor:
             diagonal. Its last ``n_last`` rows on rank 0 are the Schur rows.
         n_last: Number of Schur rows; at least 1.
         gdim: Dimension of the bodies, which decides the ordering.
+        definite: Whether the leading block must be positive definite; a tangent on the way to an
+            equilibrium need not be.
 
     Attributes:
         schur: S, shape (n_last, n_last), the same array on every rank.
+        n_negative: Negative pivots of the leading block.
 
     Raises:
         SolverError: MUMPS failed; the message says why.
     """
 
-    def __init__(self, matrix: PETSc.Mat, n_last: int, *, gdim: int = 3) -> None:
+    def __init__(
+        self, matrix: PETSc.Mat, n_last: int, *, gdim: int = 3, definite: bool = True
+    ) -> None:
         lib = library()
         if lib is None:
             raise SolverError(
@@ -75,7 +80,7 @@ class SchurFactor:
         self._factor = ctypes.c_void_p()
         self._comm = matrix.getComm().tompi4py()
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
-        matrix.setOption(PETSc.Mat.Option.SPD, True)
+        matrix.setOption(PETSc.Mat.Option.SPD, definite)
         _, end = matrix.getOwnershipRange()
         mine = np.arange(end - n_last, end) if self._comm.rank == 0 else np.zeros(0)
         rows = PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
@@ -84,7 +89,8 @@ class SchurFactor:
             if self._infog(1) not in TOO_SMALL:
                 break
         rows.destroy()
-        problem = factor_problem(self._infog, self._rinfog)
+        problem = factor_problem(self._infog, self._rinfog, definite=definite)
+        self.n_negative = self._infog(12)
         if problem:
             self.destroy()
             raise SolverError(problem)
@@ -174,7 +180,9 @@ def mirror_lower(square: Array) -> None:
         square[i : i + step, i + step :] = square[i + step :, i : i + step].T
 
 
-def factor_problem(infog: Callable[[int], int], rinfog: Callable[[int], float]) -> str | None:
+def factor_problem(
+    infog: Callable[[int], int], rinfog: Callable[[int], float], *, definite: bool = True
+) -> str | None:
     """Why a factor of a stiffness matrix must not be used, ``None`` if it may.
 
     MUMPS finds no fault in a body held by nothing: round-off leaves it a last pivot of either
@@ -184,11 +192,12 @@ def factor_problem(infog: Callable[[int], int], rinfog: Callable[[int], float]) 
     Args:
         infog: MUMPS' INFOG by number.
         rinfog: MUMPS' RINFOG by number.
+        definite: Whether negative pivots are a fault.
     """
     if infog(1) < 0:
         return mumps_message(infog(1), infog(2))
     n_negative, smallest, largest = infog(12), rinfog(19), rinfog(21)  # pivots; 0 if not told
-    if n_negative > 0 or smallest < _SMALLEST_PIVOT * largest:
+    if definite and (n_negative > 0 or smallest < _SMALLEST_PIVOT * largest):
         return mumps_message(-10, 0)
     return None
 

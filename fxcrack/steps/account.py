@@ -18,7 +18,7 @@ from fxcrack.errors import InputError
 from fxcrack.output.history import History, Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
-from fxcrack.solve.jump_system import Equilibrium, bond_work, work_between
+from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import TipValues
 from fxcrack.steps.growth import Growth
 from fxcrack.steps.letting_go import (
@@ -122,13 +122,15 @@ class Account:
         return max(x for x in waiting if x is not None)
 
     def _advance(self, here: Equilibrium, point: Equilibrium, time: float) -> None:
-        """Move along a linear piece and account for its energy."""
-        self.work += work_between(here, point, len(self.model.loads))
-        self.released += bond_work(here, point)
+        """Move along a piece and account for its energy."""
+        work, released, mean = self.model.along(here, point)
+        self.work += work
+        self.released += released
         for ramp in self._ramps:
             index = self.model.components(ramp.p, ramp.nodes)
-            force = here.force[index] + point.force[index]
-            spent = -0.5 * float(force @ (point.jump[index] - here.jump[index]))
+            force, last = here.force[index], point.force[index]
+            spent = float(force @ here.jump[index] - last @ point.jump[index])
+            spent += float((last - force) @ mean[index])
             self._by_force += spent
             if isinstance(ramp, ViscousRelease):
                 self.viscous += spent
@@ -178,11 +180,10 @@ class Account:
         if g.opening_driven:
             self.model.soften(g.p, nodes, g.energy_to_spend(nodes, values))
             return
-        before = self.model.state
-        energy = self.model.release(g.p, nodes, self._force_at(self.time))
+        energy, work = self.model.release(g.p, nodes, self._force_at(self.time))
         self.released += energy
         self._by_force += energy
-        self.work += work_between(before, self.model.state, len(self.model.loads))
+        self.work += work
 
     def _look(self) -> None:
         """Find tips anew, factor again if the window does not hold them, evaluate."""
@@ -254,7 +255,7 @@ class Account:
 
     def _record(self, event: str) -> None:
         state, model = self.model.state, self.model
-        energy = model.system.strain_energy(state)
+        energy = model.strain_energy(state)
         row: Row = {"time": self.time, "event": event}
         for (load, answer, moves), a, r in zip(
             self._names, state.loads, state.conjugate, strict=True

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.criteria import AmplitudeRelease, Ramp, RateCriterion
-from fxcrack.errors import InputError
+from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.output.history import Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.jump_system import Equilibrium, blend
@@ -73,7 +73,7 @@ class March(Account):
                 reason = self._run_events()
         except NotPositiveDefinite as error:
             reason = self._separated(error)
-        except TooManyCutbacks as error:
+        except (TooManyCutbacks, ConvergenceError) as error:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
         self._record("end")
@@ -138,7 +138,13 @@ class March(Account):
             target = min([self.time + size, self._end_time, *self._breaks_ahead()])
             books = self._books()
             self.increment += 1
-            self._follow(self._pieces(target), target)
+            try:
+                pieces = self._pieces(target)
+            except ConvergenceError as error:
+                self.increment -= 1
+                control.rejected(target - self.time, str(error))
+                continue
+            self._follow(pieces, target)
             values = self._evaluate()
             excess = [
                 v.f.max(initial=0.0) - self._upper(g)
@@ -151,6 +157,7 @@ class March(Account):
                 control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
             self._values = values
+            self.model.accept()
             for ramp in self._ramps:
                 if isinstance(ramp, ViscousRelease):
                     ramp.accept(self.time)
@@ -192,7 +199,7 @@ class March(Account):
     def _books(self) -> Any:
         """What :meth:`_undo` needs to return to the present equilibrium."""
         kept = (self.time, self.model.state, self.work, self.released, self._by_force, self.viscous)
-        return kept, self.model.system.snapshot(), self._values
+        return kept, self.model.remember(), self._values
 
     def _undo(self, books: Any) -> float:
         """Return to an earlier equilibrium, with the same bonds, and its time."""
@@ -200,7 +207,7 @@ class March(Account):
         (
             self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
         ) = kept  # fmt: skip
-        self.model.system.restore(states)
+        self.model.recall(states)
         return self.time
 
     def _breaks_ahead(self) -> list[float]:

@@ -1,0 +1,75 @@
+"""Displacements of the interface nodes, whole on every rank.
+
+delta = R^t (u_s - sum_m W_sm u_m)
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.continuum import Continuum
+from fxcrack.interface.pairing import Pair
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+class NodeValues:
+    """Values at some displacement nodes, gathered from their owners.
+
+    Args:
+        continuum: Displacement space.
+        nodes: Global displacement nodes (block indices), any order, repeated or not.
+    """
+
+    def __init__(self, continuum: Continuum, nodes: Ints) -> None:
+        self.nodes = np.unique(nodes)
+        self._gdim, self._comm = continuum.gdim, continuum.comm
+        low = continuum.offset // continuum.gdim
+        mine = (self.nodes >= low) & (self.nodes < low + continuum.n_local // continuum.gdim)
+        self._here = np.flatnonzero(mine)
+        self._local = self.nodes[mine] - low
+
+    def gather(self, owned: Array) -> Array:
+        """Values at the nodes, shape (n_nodes, gdim); collective.
+
+        Args:
+            owned: Values on the owned dofs of this rank, shape (n_local,).
+        """
+        out = np.zeros((len(self.nodes), self._gdim))
+        mine = owned.reshape(-1, self._gdim)[self._local]
+        for here, values in self._comm.allgather((self._here, mine)):
+            out[here] = values
+        return out
+
+    def find(self, nodes: Ints) -> Ints:
+        """Rows of :meth:`gather` for some of the nodes."""
+        return np.searchsorted(self.nodes, nodes)
+
+
+class JumpReader:
+    """Reads the jumps of all pairs off a displacement.
+
+    Args:
+        continuum: Displacement space.
+        pairs: Interfaces.
+    """
+
+    def __init__(self, continuum: Continuum, pairs: list[Pair]) -> None:
+        nodes = [p.surface.dofs for p in pairs]
+        nodes += [p.masters.ravel() for p in pairs]
+        self.values = NodeValues(
+            continuum, np.concatenate(nodes) if nodes else np.zeros(0, dtype=np.int64)
+        )
+
+    def slaves(self, values: Array, pair: Pair) -> Array:
+        """Displacements of a pair's slave nodes, shape (n_nodes, gdim)."""
+        return values[self.values.find(pair.surface.dofs)]
+
+    def jumps(self, values: Array, pair: Pair, frames: Array) -> Array:
+        """Jumps of a pair in its frames, shape (n_nodes, gdim); of paired nodes only."""
+        masters = values[self.values.find(pair.masters)]
+        jump = self.slaves(values, pair) - np.einsum("nk,nkc->nc", pair.weights, masters)
+        jump[~pair.paired] = 0.0
+        return np.asarray(np.einsum("nci,nc->ni", frames, jump))

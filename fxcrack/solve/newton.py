@@ -1,0 +1,268 @@
+"""A nonlinear continuum as its interfaces see it: SNES in the bodies, dense algebra between them.
+
+    T^t r(u) = (0, p)      r internal minus external forces, p forces of bonds and contact
+
+SNES works on y, the change of the jump coordinates since the last accepted state. Each of its
+steps condenses the tangent onto the window, finds jumps and forces of the interface there (bonds,
+contact, softening: the same code as for a linear continuum), and expands them. The residual it
+reduces is T^t r with the interface forces taken off where they are known.
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fxcrack.errors import ConvergenceError, SolverError
+from fxcrack.solve.cholesky import NotPositiveDefinite
+
+Array = npt.NDArray[np.float64]
+
+REASONS = {
+    -1: "the function left its domain",
+    -2: "too many function evaluations",
+    -3: "the linear solve failed",
+    -4: "the residual is not a number: the load step distorts elements beyond use",
+    -5: "too many iterations",
+    -6: "the line search found no smaller residual",
+    -7: "the inner solve failed",
+    -8: "it stopped at a local minimum of the residual",
+    -9: "the residual grew",
+    -10: "the Jacobian left its domain",
+    -11: "the trust region shrank to nothing",
+}
+"""Negative values of SNES.ConvergedReason in words."""
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Controls of the nonlinear iteration.
+
+    Args:
+        tolerance: Residual over the forces in the bodies at which the iteration ends.
+        max_iterations: Iterations allowed in one solve.
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 25
+
+
+@dataclass
+class Counts:
+    """What the nonlinear iterations have done so far.
+
+    Attributes:
+        solves: Equilibria found.
+        iterations: Iterations they took in all.
+        failures: Solves that did not converge.
+        residuals: Norms of the last solve, one per iteration, force.
+    """
+
+    solves: int = 0
+    iterations: int = 0
+    failures: int = 0
+    residuals: list[float] = field(default_factory=list)
+
+
+class InterfaceProblem:
+    """What SNES asks of the bodies and their interfaces at a trial y.
+
+    The callbacks are small so that each can be tested alone.
+
+    Args:
+        model: The Newton model; owns bodies, condensation and dense system.
+        loads: Loads of the increment's end, shape (n_loads,).
+        force: Given forces of its end, shape (n_window,).
+        guess: Interface forces at the initial guess, shape (n_window,).
+    """
+
+    def __init__(self, model: Any, loads: Array, force: Array, guess: Array) -> None:
+        self.model = model
+        self.loads, self.force = loads, force
+        self.known = guess
+        """Interface forces that belong to the present iterate, shape (n_window,)."""
+        self.fraction = 1.0
+        """Length of the last line-search step."""
+        self.solution: Any = None
+        """Dense equilibrium of the last iteration."""
+        self.values = np.zeros(0)
+        """T^t r on the last rows at the last residual evaluated, shape (n_last,)."""
+        self.scale = 0.0
+        self.error: Exception | None = None
+        """What a callback raised; PETSc passes on an error code only."""
+        self._last: tuple[PETSc.Vec, PETSc.Vec, Array, Array] | None = None
+        self._residual: PETSc.Vec | None = None
+
+    def residual(self, snes: Any, y: PETSc.Vec, out: PETSc.Vec) -> None:
+        """T^t r(u) minus the interface forces that belong to y."""
+        model = self.model
+        forces = model.forces_at(y, self.loads)
+        self.scale = model.force_scale
+        transform = model.coordinates.transform
+        transform.multTranspose(forces, out)
+        n_inner, n = model.coordinates.n_inner, model.system.n_window
+        values = np.zeros(model.coordinates.n_last)
+        if model.comm.rank == 0:
+            values[:] = out.array[n_inner:]
+            out.array[n_inner:] = 0.0
+        model.comm.Bcast(values)
+        self.values = values
+        self._follow(y)
+        if model.comm.rank == 0:
+            known = model.system.knows_force()
+            wrong = np.where(known, values[:n] - self.known, 0.0)
+            out.array[n_inner : n_inner + n] = wrong
+        if self._residual is not None:
+            self._residual.destroy()
+        self._residual = forces
+
+    def _follow(self, y: PETSc.Vec) -> None:
+        """Interface forces at a trial y: between those before and after the whole step."""
+        if self._last is None:
+            return
+        start, step, before, after = self._last
+        way = start.copy()
+        way.axpy(-1.0, y)
+        square = float(step.dot(step))
+        self.fraction = float(way.dot(step)) / square if square > 0.0 else 1.0
+        rounding = 1e3 * np.finfo(float).eps * float(y.norm()) / np.sqrt(square or 1.0)
+        if abs(self.fraction - 1.0) < 1e-6 + rounding:
+            self.fraction = 1.0  # a shortened step is shorter by a tenth at least
+        way.destroy()
+        self.known = before + self.fraction * (after - before)
+
+    def step(self, y: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Newton step -dy (SNES subtracts it) from the condensed complementarity problem."""
+        model = self.model
+        assert self._residual is not None
+        jump = model.jumps_of(y)
+        model.linearise(jump, self.loads, self._residual, out)
+        start = time.perf_counter()
+        self.solution = model.interface_equilibrium(self.loads, self.force)
+        model.timings.add("interface", start)
+        change = self.solution.jump - jump
+        last = np.zeros(model.coordinates.n_last)
+        last[: model.system.n_window] = change
+        dq = model.condensation.expanded(last)
+        out.axpy(-1.0, dq)
+        dq.destroy()
+        after = model.system.forces(self.solution, np.arange(model.system.n_window))
+        if self._last is not None:
+            self._last[0].destroy()
+            self._last[1].destroy()
+        self._last = (y.copy(), out.copy(), self.known.copy(), after)
+
+    def converged(self, snes: Any, its: int, norms: tuple[float, float, float]) -> int:
+        """End when the residual is small beside the forces in the bodies, after a whole step."""
+        norm = norms[2]
+        if not np.isfinite(norm):
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
+        self.model.counts.residuals.append(norm)
+        level = max(self.model.newton.tolerance * self.scale, self.model.round_off)
+        if norm <= level and self.fraction == 1.0:
+            return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
+        if its >= self.model.newton.max_iterations:
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)
+        return 0
+
+    def destroy(self) -> None:
+        """Free vectors; collective."""
+        if self._last is not None:
+            self._last[0].destroy()
+            self._last[1].destroy()
+        if self._residual is not None:
+            self._residual.destroy()
+
+
+class _MeritOperator:
+    """The Jacobian as the line search needs it: on the Newton step it gives the residual back."""
+
+    def __init__(self) -> None:
+        self.residual: PETSc.Vec | None = None
+
+    def mult(self, matrix: Any, x: PETSc.Vec, y: PETSc.Vec) -> None:
+        assert self.residual is not None
+        self.residual.copy(y)
+
+
+class _StepSolver:
+    """SNES' linear solver: the condensed complementarity problem of the present iterate."""
+
+    def __init__(self, problem: InterfaceProblem) -> None:
+        self._problem = problem
+        self.iterate: PETSc.Vec | None = None
+
+    def apply(self, pc: Any, right: PETSc.Vec, out: PETSc.Vec) -> None:
+        assert self.iterate is not None
+        try:
+            self._problem.step(self.iterate, out)
+        except Exception as error:
+            self._problem.error = error
+            raise
+
+
+def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
+    """Drive SNES from an initial y to equilibrium; collective.
+
+    Args:
+        problem: Residual, step and convergence test.
+        y: Initial guess; the solution on return.
+
+    Returns:
+        Number of iterations.
+
+    Raises:
+        ConvergenceError: It did not get there; the message carries SNES' reason in words.
+    """
+    comm = y.getComm()
+    merit, stepper = _MeritOperator(), _StepSolver(problem)
+    operator = PETSc.Mat().createPython((y.getSizes(), y.getSizes()), merit, comm=comm)
+    operator.setUp()
+    snes = PETSc.SNES().create(comm)
+    snes.setOptionsPrefix("fxcrack_newton_")
+    work = y.duplicate()
+    snes.setFunction(problem.residual, work)
+
+    def jacobian(snes: Any, x: PETSc.Vec, matrix: Any, preconditioner: Any) -> None:
+        stepper.iterate, merit.residual = x, work
+
+    snes.setJacobian(jacobian, operator)
+    snes.setConvergenceTest(problem.converged)
+    ksp = snes.getKSP()
+    ksp.setType(PETSc.KSP.Type.PREONLY)
+    pc = ksp.getPC()
+    pc.setType(PETSc.PC.Type.PYTHON)
+    pc.setPythonContext(stepper)
+    snes.setTolerances(max_it=problem.model.newton.max_iterations + 1)
+    snes.setFromOptions()
+    try:
+        snes.solve(None, y)
+        reason, iterations = int(snes.getConvergedReason()), int(snes.getIterationNumber())
+        norm = float(snes.getFunctionNorm())
+    except PETSc.Error as error:
+        if isinstance(problem.error, NotPositiveDefinite | SolverError):
+            raise ConvergenceError(
+                "nonlinear solve: the tangent is not positive definite, so the load step is too "
+                "large or the bodies lose their stability (buckling, a limit load); take smaller "
+                "increments (maximum=, minimum=)"
+            ) from problem.error
+        raise problem.error or error from error
+    finally:
+        snes.destroy()
+        operator.destroy()
+        work.destroy()
+    if reason <= 0:
+        words = REASONS.get(reason, f"SNES reason {reason}")
+        raise ConvergenceError(
+            f"nonlinear solve: {words} (iteration {iterations}, residual {norm:.2e} beside forces "
+            f"of {problem.scale:.2e}); take smaller increments (maximum=, minimum=)"
+        )
+    return iterations
+
+
+__all__ = ["ConvergenceError", "InterfaceProblem", "NewtonOptions", "SolverError", "solve"]

@@ -1,0 +1,116 @@
+"""Marching a nonlinear continuum: predict on the tangent, correct, find where f = 1 by secants.
+
+Every accepted state is an equilibrium. The next one is sought where the tangent says f = 1 (for
+linear bodies exactly there). If f is below 1 it is a step on the way; if above, it is forgotten
+and the secant through both ends gives the next guess.
+"""
+
+from __future__ import annotations
+
+from fxcrack import log
+from fxcrack.errors import ConvergenceError
+from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.solve.newton_model import NewtonModel
+from fxcrack.steps.evaluate import TipValues
+from fxcrack.steps.increments import TooManyCutbacks
+from fxcrack.steps.march import March
+
+_AT_ONE = 1e-9
+"""How near to 1 the criterion must be at an onset."""
+_SMALLEST = 1e-6
+"""Smallest piece of a way, before it counts as impassable."""
+
+
+class NewtonMarch(March):
+    """One step on a :class:`~fxcrack.solve.newton_model.NewtonModel`.
+
+    Arguments as for :class:`~fxcrack.steps.account.Account`.
+    """
+
+    model: NewtonModel
+
+    def _walk(self, target: float, *, upward: bool) -> bool:
+        """Go towards a time; stop where the largest f crosses 1.
+
+        Returns:
+            Whether it did.
+
+        Raises:
+            TooManyCutbacks: No equilibrium was found, however small the increment.
+        """
+        whole = abs(target - self.time)
+        size = self.step.maximum
+        beyond: tuple[float, float] | None = None
+        while True:
+            begin = self.time
+            way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
+            guess = self._predicted(begin + way, upward=upward)
+            if beyond is not None:
+                guess = self._secant(beyond, guess)
+            saved = self.model.system.snapshot()
+            here = self.model.state
+            try:
+                point = self.model.move(
+                    self.loads_at(guess), self._force_at(guess), guess, guess - begin
+                )
+            except ConvergenceError as error:
+                print("cut", guess, error)
+                size = 0.25 * abs(guess - begin)
+                if size < _SMALLEST * whole:
+                    raise TooManyCutbacks(str(error)) from error
+                log.info("cut back to an increment of %g: %s", size, error)
+                continue
+            before, self._values = self._values, self._evaluate_at(point, guess)
+            level = max(self._largest())
+            crossed = level > 1.0 + _AT_ONE if upward else level < 1.0 - _AT_ONE
+            if crossed and abs(guess - begin) > _SMALLEST * _AT_ONE * whole:
+                self.model.reject(saved)
+                self._values = before
+                beyond = (guess, level)
+                continue
+            self._advance(here, point, guess)
+            self.model.accept()
+            if abs(level - 1.0) <= _AT_ONE or crossed:
+                return True
+            if guess == target:
+                return False
+            if beyond is None:
+                size = min(2.0 * size, self.step.maximum)
+                self._record("increment")
+
+    def _predicted(self, target: float, *, upward: bool) -> float:
+        """Time before a target at which f reaches 1 on the tangent; the target if it does not."""
+        system = self.model.system
+        saved = system.snapshot()
+        here, begin, done, found = self.model.state, self.time, 0.0, target
+        for fraction, point in system.pieces(here, self.loads_at(target), self._force_at(target)):
+            a, b = (begin + x * (target - begin) for x in (done, fraction))
+            hit = self._hit(self._values, here, point, (a, b), upward=upward) if a != b else None
+            if hit is not None:
+                found = a + hit * (b - a)
+                break
+            here, done = point, fraction
+        system.restore(saved)
+        return found
+
+    def _secant(self, beyond: tuple[float, float], predicted: float) -> float:
+        """Time between the present one and one at which f was beyond 1, near f = 1."""
+        far, level = beyond
+        present = max(self._largest())
+        degree = max(g.evaluator.degree for g in self.growths)
+        a, b = present ** (1.0 / degree) - 1.0, level ** (1.0 / degree) - 1.0
+        secant = self.time - a * (far - self.time) / (b - a)
+        low, high = sorted((self.time, far))
+        inside = low < predicted < high
+        margin = 1e-3 * (high - low)
+        guess = predicted if inside and present > 0.9 else secant
+        return float(min(max(guess, low + margin), high - margin))
+
+    def _evaluate_at(self, state: Equilibrium, time: float) -> list[TipValues]:
+        return [
+            g.evaluate(v.tips, state, time) for g, v in zip(self.growths, self._values, strict=True)
+        ]
+
+    def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
+        loads, force = self.loads_at(target), self._force_at(target)
+        return [(1.0, self.model.move(loads, force, target, target - self.time))]
