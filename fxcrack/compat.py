@@ -26,6 +26,19 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 
+def plain_comm(comm: MPI.Intracomm) -> MPI.Intracomm:
+    """The predefined communicator with the same ranks in the same order, if there is one.
+
+    DOLFINx and PETSc free their duplicates when their last object dies. mpi4py attaches a lock to
+    a communicator on which Python objects were sent, and its callback cannot run while an exception
+    is on its way: the process would hang. So fxcrack sends on communicators that are never freed.
+    """
+    for known in (MPI.COMM_WORLD, MPI.COMM_SELF):
+        if MPI.Comm.Compare(comm, known) in (MPI.IDENT, MPI.CONGRUENT):
+            return known
+    return comm
+
+
 def coordinate_element(cell_name: str, degree: int, gdim: int) -> Any:
     """Equispaced vector Lagrange element of a mesh's geometry, for :func:`create_mesh`."""
     variant = basix.LagrangeVariant.equispaced

@@ -229,6 +229,11 @@ class Scene:
         if self.plan.path == "newton":
             from fxcrack.steps.newton_march import NewtonMarch
 
+            if isinstance(step, Cycles):
+                raise InputError(
+                    "fatigue steps need linear bodies, but this scene takes the nonlinear path "
+                    f"({'; '.join(self.plan.why)}); leave that effect out, or run Static steps"
+                )
             return NewtonMarch(self.model, growths, step, *common, **carried)
         if isinstance(step, Cycles):
             carried["fatigue"] = self.fatigue

@@ -135,8 +135,10 @@ def assert_same(one: fx.History, other: fx.History, rtol: float, **atol: float) 
         for kind in {c.split("[")[0] for c in one.columns if c != "event"}
     }
     # reactions of components that carry nothing, modes that are absent: by the others' size
-    scale["GII"] = scale["GIII"] = scale.get("GI", 0.0)
-    scale["balance"] = scale["released_energy"] = scale["external_work"]
+    rates = ("GI", "GII", "GIII")
+    scale |= dict.fromkeys(rates, max(scale.get(mode, 0.0) for mode in rates))
+    for energy in ("balance", "released_energy", "snap_energy"):
+        scale[energy] = scale["external_work"]
     for name in one.columns:
         if name == "event":
             continue

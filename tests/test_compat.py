@@ -16,7 +16,9 @@ import ufl
 from mpi4py import MPI
 from petsc4py import PETSc
 
+import fxcrack as fx
 from fxcrack import compat
+from fxcrack.meshes.dcb import dcb_2d
 
 pytestmark = pytest.mark.mpi
 
@@ -185,3 +187,14 @@ def test_vector_of_a_form_or_a_space(comm: MPI.Comm) -> None:
         # Integral of 1 + 2 over the unit square; sums of 25 numbers of order 0.1.
         assert b.sum() == pytest.approx(3.0, abs=1e-13)
         b.destroy()
+
+
+def test_an_error_while_a_mesh_dies_is_raised(comm: MPI.Intracomm) -> None:
+    # the mesh is only an argument of the call that fails; its communicator goes with it
+    with pytest.raises(fx.InputError, match="no mode-mix law"):
+        fx.Scene(
+            dcb_2d(comm, dx=10.0, ny=1),
+            materials=fx.Isotropic(1.0, 0.3),
+            model=fx.PlaneStrain(),
+            debonds=[fx.Debond(None, fx.VCCT(GIc=1.0, GIIc=2.0))],  # type: ignore[arg-type]
+        )

@@ -64,7 +64,7 @@ def test_linear_bodies_with_contact(comm: MPI.Intracomm) -> None:
                 fx.Displacement("support_right", y=0.0),
                 fx.Displacement("load", y=-1.0),
             ],
-            debonds=[fx.Debond(interface, fx.VCCT(GIc=0.2, GIIc=0.5))],
+            debonds=[fx.Debond(interface, fx.VCCT(GIc=0.2, GIIc=0.5, mix=fx.BK(eta=1.6)))],
             path=path,
         )
         return scene.run(fx.Static(until=fx.Releases(2)))

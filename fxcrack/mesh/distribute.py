@@ -41,7 +41,7 @@ def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
 
 def _cell_groups(raw: RawMesh | None, domain: Domain) -> dict[str, npt.NDArray[np.int32]]:
     """Local cells of each group of cells, found by the cells' places in the input."""
-    comm = domain.comm
+    comm = compat.plain_comm(domain.comm)
     sent = comm.gather(compat.original_cell_index(domain))
     members: list[dict[str, npt.NDArray[np.int32]]] | None = None
     if raw is not None and sent is not None:
@@ -59,7 +59,7 @@ def _lower_groups(
     raw: RawMesh | None, domain: Domain, dim: int, name: str
 ) -> dict[str, npt.NDArray[np.int32]]:
     """Local entities of each group of dimension ``dim`` below the cells."""
-    comm = domain.comm
+    comm = compat.plain_comm(domain.comm)
     names: list[str] = []
     rows = np.empty((0, 1), dtype=np.int64)
     numbers = np.empty(0, dtype=np.int32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-import fxcrack.compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.la
 import dolfinx.mesh
 import numpy as np
@@ -37,7 +37,7 @@ def mesh_from_domain(
     Example:
         ``mesh_from_domain(domain, {"left": (1, lambda x: np.isclose(x[0], 0.0))})``
     """
-    comm = domain.comm
+    comm = compat.plain_comm(domain.comm)
     tdim = domain.topology.dim
     asked = [(key, int(dim)) for key, (dim, _) in groups.items()]
     problem = None

@@ -43,8 +43,7 @@ class Mesh:
     @property
     def comm(self) -> MPI.Intracomm:
         """Communicator of the mesh."""
-        comm: MPI.Intracomm = self.domain.comm
-        return comm
+        return compat.plain_comm(self.domain.comm)
 
     @property
     def gdim(self) -> int:

@@ -19,6 +19,7 @@ import numpy.typing as npt
 import scipy.sparse as sp
 from petsc4py import PETSc
 
+from fxcrack import compat
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, SolverError
 from fxcrack.interface.jumps import JumpCoordinates
@@ -99,7 +100,7 @@ def bordered_matrix(
     on_window = np.zeros((coordinates.n_window, len(borders)))
     if not borders:
         return inner, on_window
-    comm = inner.getComm().tompi4py()
+    comm = compat.plain_comm(inner.getComm().tompi4py())
     (n_rows, n_columns), _ = inner.getSizes()
     indptr, indices, data = inner.getValuesCSR()
     first = coordinates.first + coordinates.n_window + coordinates.n_supports
@@ -118,7 +119,7 @@ def bordered_matrix(
                 (values, (local, np.full(len(local), first + i))), shape=(n_rows, n_columns)
             )
         )
-        found = comm.gather((local + start, values))
+        found: Any = comm.gather((local + start, values))
         if comm.rank == 0:
             columns, entries = (np.concatenate(p) for p in zip(*found, strict=True))
             # a stored diagonal, however small: without one the symmetric conversion goes wrong
@@ -180,7 +181,7 @@ class Condensation:
         self.timings = timings
         self.n_negative = 0
         self._definite = definite
-        self._comm = stiffness.getComm().tompi4py()
+        self._comm = compat.plain_comm(stiffness.getComm().tompi4py())
         self._factor: SchurFactor | None = None
         self._inner: PETSc.KSP | None = None
         self._inner_matrix: PETSc.Mat | None = None

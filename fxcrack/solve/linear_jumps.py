@@ -117,29 +117,6 @@ class LinearJumps:
         self.release(free)
         self.soft.renew(schur, bonds, self.cholesky)
 
-    def renew(self, schur: Array, offset: Array) -> None:
-        """Take the tangent at another state of the continuum; the states stay as they are.
-
-        Raises:
-            NotPositiveDefinite: The free components have no stable equilibrium with it.
-        """
-        free, bonds, old = self.cholesky.free, self.soft.bonds, (self.schur, self.offset)
-        try:
-            self._take(schur, offset, free, bonds)
-        except NotPositiveDefinite:
-            self._take(*old, free, bonds)
-            raise
-
-    def _take(self, schur: Array, offset: Array | None, free: Ints, bonds: list[SoftBond]) -> None:
-        self.schur, self.offset = schur, offset
-        self.cholesky = GrowingCholesky(schur)
-        self._forward = np.zeros((0, len(self.load_columns) + (offset is not None)))
-        self._unit = None
-        self.soft.bonds = []
-        self.free[:] = False
-        self.release(free)
-        self.soft.renew(schur, bonds, self.cholesky)
-
     def knows_force(self) -> Bools:
         """Components whose force the interface laws give, shape (n_window,)."""
         known = self.free | self.contact

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -318,7 +319,7 @@ class NewtonModel(CondensedModel):
         given = force - here.force
         given[soft] = given[self.system.soft.components] = 0.0
         way = [*(point for _, point in points), end]
-        bonds = sum(bond_work(a, b) for a, b in zip(way, way[1:], strict=False))
+        bonds = sum(bond_work(a, b) for a, b in pairwise(way))
         self.last_move = Move(
             here,
             end,
@@ -478,7 +479,7 @@ def _along(points: list[tuple[float, Equilibrium]], name: str) -> Array:
     return np.sum(
         [
             0.5 * (t - s) * (getattr(a, name) + getattr(b, name))
-            for (s, a), (t, b) in zip(points, points[1:], strict=False)
+            for (s, a), (t, b) in pairwise(points)
         ],
         axis=0,
     )

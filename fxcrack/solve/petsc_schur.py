@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from fxcrack import compat
 from fxcrack.errors import SolverError
 
 Array = npt.NDArray[np.float64]
@@ -78,7 +79,7 @@ class SchurFactor:
         self._lib = lib
         self._ordering = ordering(gdim)
         self._factor = ctypes.c_void_p()
-        self._comm = matrix.getComm().tompi4py()
+        self._comm = compat.plain_comm(matrix.getComm().tompi4py())
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, definite)
         _, end = matrix.getOwnershipRange()
