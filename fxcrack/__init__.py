@@ -45,6 +45,7 @@ from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.steps.fatigue import Cycles
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength, Releases, Time
+from fxcrack.temperature import ByTemperature, Temperature
 
 __version__ = "0.1.0"
 
@@ -58,6 +59,7 @@ __all__ = [
     "Axisymmetric",
     "BodyForce",
     "BondHistory",
+    "ByTemperature",
     "CondensedOptions",
     "CrackLength",
     "CrackLengthVsTime",
@@ -95,6 +97,7 @@ __all__ = [
     "Static",
     "Step",
     "Tabulated",
+    "Temperature",
     "Time",
     "Traction",
     "bond_table",

@@ -9,7 +9,7 @@ columns of the coordinate transformation (:mod:`fxcrack.interface.jumps`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
 import basix
@@ -23,10 +23,14 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fxcrack.errors import InputError, agree
-from fxcrack.loads import BodyForce, Field, Load, Pressure, Traction
+from fxcrack.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
 from fxcrack.models import Model
+
+if TYPE_CHECKING:
+    from fxcrack.temperature import Temperature
+    from fxcrack.thermal import TemperatureField, ThermalLoad
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -40,6 +44,7 @@ class Continuum:
         materials: One material, or a material per cell group covering every cell once.
         model: Kinematic model.
         order: Polynomial order of the displacement, 1 or 2; the order of the mesh by default.
+        temperature: Temperature of the bodies; ``None`` for none.
 
     Attributes:
         space: Displacement space.
@@ -48,6 +53,7 @@ class Continuum:
         degree: Quadrature degree of all integrals.
         parts: Stiffness on the model's strains, all stresses per strain, and measure, per material.
         part_materials: The material of each part.
+        temperature: The temperature on this mesh, ``None`` where there is none.
 
     Raises:
         InputError: The model does not fit the mesh, or the materials do not cover it once.
@@ -60,6 +66,7 @@ class Continuum:
         model: Model,
         *,
         order: int | None = None,
+        temperature: Temperature | None = None,
     ) -> None:
         if model.gdim != mesh.gdim:
             raise InputError(
@@ -86,6 +93,11 @@ class Continuum:
             else weight
         )
         self.degree = 2 * self.order + (1 if "Axisymmetric" in type(model).__name__ else 0)
+        self.temperature: TemperatureField | None = None
+        if temperature is not None:
+            from fxcrack.thermal import TemperatureField
+
+            self.temperature = TemperatureField(mesh.domain, self.order, temperature)
         self.part_materials: list[Material] = []
         self.parts = self._assign(materials)
         self._form: Any = None
@@ -95,7 +107,7 @@ class Continuum:
         domain, meta = self.mesh.domain, {"quadrature_degree": self.degree}
         if not isinstance(materials, Mapping):
             self.part_materials = [materials]
-            return [(*self._constants(materials), ufl.dx(domain, metadata=meta))]
+            return [(*self._moduli(0), ufl.dx(domain, metadata=meta))]
         n_cells = domain.topology.index_map(self.mesh.tdim).size_local
         count = np.zeros(n_cells, dtype=np.int32)
         cells, values = [], []
@@ -117,10 +129,18 @@ class Continuum:
         sort = np.argsort(entities)
         marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])
         dx = ufl.Measure("dx", domain=domain, subdomain_data=marks, metadata=meta)
-        return [(*self._constants(m), dx(i + 1)) for i, m in enumerate(materials.values())]
+        return [(*self._moduli(i), dx(i + 1)) for i in range(len(materials))]
 
-    def _constants(self, material: Material) -> tuple[Any, Any]:
+    def _moduli(self, i: int) -> tuple[Any, Any]:
         """Stiffness on the strains of the model, and all its stresses per unit strain."""
+        material, model = self.part_materials[i], self.model
+        if self.temperature is not None and hasattr(material, "temperatures"):
+            from fxcrack.thermal import interpolated
+
+            return (
+                interpolated(self, i, lambda m: model.reduce(m.stiffness())),
+                interpolated(self, i, lambda m: model.recover(m.stiffness())),
+            )
         domain, c = self.mesh.domain, material.stiffness()
         return (
             fem.Constant(domain, self.model.reduce(c)),
@@ -143,7 +163,7 @@ class Continuum:
         matrix.assemble()
         return matrix
 
-    def load_vector(self, load: Load) -> PETSc.Vec:
+    def load_vector(self, load: Load | ThermalLoad) -> PETSc.Vec:
         """Nodal forces of a load at amplitude 1; the caller destroys the vector."""
         v = ufl.TestFunction(self.space)
         if isinstance(load, Traction):
@@ -156,6 +176,10 @@ class Continuum:
         elif isinstance(load, BodyForce):
             value = self._vector(load.value, load.title)
             form = ufl.inner(value, v) * self.weight * self.volume(load.where)
+        elif not isinstance(load, PointForce):
+            from fxcrack.thermal import load_form
+
+            form = load_form(self, load, v)
         else:
             return self._point_force(load.where, load.value, load.title)
         vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
@@ -231,7 +255,10 @@ class Continuum:
         return np.asarray(self.space.tabulate_dof_coordinates())
 
     def stress(self, u: fem.Function) -> fem.Function:
-        """Cell averages of the stress, components in the order of ``model.stress_labels``."""
+        """Cell averages of the stress, components in the order of ``model.stress_labels``.
+
+        That of the small strain, at the present temperature (``temperature.set(time)``).
+        """
         n = len(self.model.stress_labels)
         element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
         space = fem.functionspace(self.mesh.domain, element)
@@ -241,8 +268,8 @@ class Continuum:
             fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self.weight * ufl.dx)
         )
         sigma = sum(
-            ufl.inner(ufl.dot(recover, strain), test) * self.weight * dx
-            for _, recover, dx in self.parts
+            ufl.inner(self._stress(i, strain), test) * self.weight * self.parts[i][2]
+            for i in range(len(self.parts))
         )
         integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
         out = fem.Function(space, name="stress")
@@ -252,6 +279,13 @@ class Continuum:
         volume.destroy()
         integral.destroy()
         return out
+
+    def _stress(self, i: int, strain: Any) -> Any:
+        if self.temperature is None:
+            return ufl.dot(self.parts[i][1], strain)
+        from fxcrack.thermal import whole_stress
+
+        return whole_stress(self, i, strain)
 
     def von_mises(self, stress: fem.Function) -> fem.Function:
         """Von Mises stress per cell, of the cell averages of the stress."""

@@ -78,10 +78,52 @@ class Term:
         """Set the committed state from :meth:`state`."""
 
 
+class StoringTerm(Term):
+    """A term of some parts that stores all the energy it takes, and knows their temperature.
+
+    Args:
+        continuum: Materials, model, measures and temperature.
+        form: Which parts (:func:`parts_of`).
+    """
+
+    def __init__(self, continuum: Continuum, form: str) -> None:
+        self._continuum = continuum
+        self._parts = parts_of(continuum, form)
+        self._thermal: Any = None
+        if continuum.temperature is not None:
+            from fxcrack.terms.thermal import ThermalWork
+
+            self._thermal = ThermalWork(continuum, self.energy)
+
+    def begin(self, time: float, dt: float) -> None:
+        """Set the temperature at the end of the increment."""
+        if self._thermal is not None:
+            self._thermal.begin(time)
+            self.version = self._thermal.version
+
+    def commit(self, u: fem.Function) -> None:
+        """Add the work of the temperature."""
+        if self._thermal is not None:
+            self._thermal.commit(u)
+
+    def work(self) -> float:
+        """Work of the temperature up to the last commit."""
+        return 0.0 if self._thermal is None else float(self._thermal.work)
+
+    def state(self) -> dict[str, Array]:
+        """State of the work of the temperature."""
+        return {} if self._thermal is None else dict(self._thermal.state())
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state`."""
+        if self._thermal is not None:
+            self._thermal.restore(state)
+
+
 def parts_of(continuum: Continuum, form: str) -> list[int]:
     """Parts of a continuum whose material names a form of its own, or "elastic" for the others."""
     forms = [getattr(m, "form", "elastic") for m in continuum.part_materials]
     return [i for i, f in enumerate(forms) if f == form]
 
 
-__all__ = ["Term", "parts_of"]
+__all__ = ["StoringTerm", "Term", "parts_of"]

@@ -1,7 +1,8 @@
-"""Elastic bodies: W = 1/2 int (e - e0) : C : (e - e0) w dV, for small or finite strain.
+"""Elastic bodies: W = 1/2 int (e - e_th) : C : (e - e_th) w dV, for small or finite strain.
 
 With e the small strain the term is linear; with e the Green-Lagrange strain it is the
-St. Venant-Kirchhoff material, for isotropic and orthotropic stiffness alike.
+St. Venant-Kirchhoff material, for isotropic and orthotropic stiffness alike. The thermal strain of
+the latter is that of the stretch 1 + expansion (T - T_ref): e_th = A + A^2/2.
 """
 
 from __future__ import annotations
@@ -12,22 +13,21 @@ import ufl
 from dolfinx import fem
 
 from fxcrack.continuum import Continuum
-from fxcrack.terms.base import Term, parts_of
+from fxcrack.terms.base import StoringTerm
 from fxcrack.terms.kinematics import green_lagrange
 
 
-class Elastic(Term):
+class Elastic(StoringTerm):
     """Elastic bodies of a continuum: all parts whose material names no other form.
 
     Args:
-        continuum: Materials, model and measures.
+        continuum: Materials, model, measures and temperature.
         finite: Green-Lagrange strain instead of the small one.
     """
 
     def __init__(self, continuum: Continuum, *, finite: bool = False) -> None:
-        self._continuum = continuum
+        super().__init__(continuum, "elastic")
         self._finite = finite
-        self._parts = parts_of(continuum, "elastic")
         self.name = "finite strain" if finite else "elasticity"
         self.constant = not finite
 
@@ -38,5 +38,14 @@ class Elastic(Term):
         total = 0
         for i in self._parts:
             stiffness, _, dx = c.parts[i]
-            total += 0.5 * ufl.inner(ufl.dot(stiffness, strain), strain) * c.weight * dx
+            e = strain
+            if c.temperature is not None:
+                from fxcrack import thermal
+
+                rise = c.temperature.rise
+                stiffness = thermal.whole_stiffness(c, i)
+                e = thermal.whole(c.model, strain) - rise * thermal.expansion(c, i)
+                if self._finite:
+                    e -= rise**2 / 2 * thermal.square_expansion(c, i)
+            total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
         return total

@@ -1,5 +1,8 @@
 """Neo-Hookean bodies: W = mu/2 (tr F^t F - 3 - 2 ln J) + lambda/2 (ln J)^2 per undeformed volume.
 
+With a temperature F = F_e (1 + expansion (T - T_ref)): the energy is that of the elastic part F_e
+per volume of the freely expanded body.
+
 Plane strain, axisymmetric and three-dimensional bodies; the stretch out of a plane is 1.
 """
 
@@ -14,11 +17,11 @@ from petsc4py import PETSc
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError
 from fxcrack.models import PlaneStress
-from fxcrack.terms.base import Term, parts_of
+from fxcrack.terms.base import StoringTerm
 from fxcrack.terms.kinematics import deformation_gradient
 
 
-class NeoHookeanBodies(Term):
+class NeoHookeanBodies(StoringTerm):
     """The parts of a continuum made of :class:`fxcrack.NeoHookean`.
 
     Args:
@@ -36,8 +39,7 @@ class NeoHookeanBodies(Term):
                 "NeoHookean: its thickness stretch is not solved for in plane stress; use "
                 "PlaneStrain, Axisymmetric or Solid, or an Isotropic material with finite strain"
             )
-        self._continuum = continuum
-        self._parts = parts_of(continuum, "neo_hookean")
+        super().__init__(continuum, "neo_hookean")
 
     def energy(self, u: fem.Function) -> Any:
         """Strain energy."""
@@ -49,7 +51,14 @@ class NeoHookeanBodies(Term):
             stiffness = c.part_materials[i].stiffness()
             mu = fem.Constant(domain, PETSc.ScalarType(stiffness[3, 3]))
             lame = fem.Constant(domain, PETSc.ScalarType(stiffness[0, 1]))
-            total += density(f, mu, lame) * c.weight * c.parts[i][2]
+            if c.temperature is None:
+                energy = density(f, mu, lame)
+            else:
+                from fxcrack import thermal
+
+                stretch = 1 + c.temperature.rise * thermal.expansion(c, i)[0]
+                energy = stretch**3 * density(f / stretch, mu, lame)
+            total += energy * c.weight * c.parts[i][2]
         return total
 
 
