@@ -29,6 +29,9 @@ HELD_FAR = (
     fx.Displacement("far_upper", x=0.0, y=0.0),
     fx.Displacement("far_lower", x=0.0, y=0.0),
 )
+PARIS = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.2, r2=0.9)
+GROWS = ("cycle", "release", "unstable")
+HALF_OPENING = 1.0  # of each arm; G = 0.26 at a = 30
 CLAMPED_3D = (
     fx.Displacement("far_upper", x=0.0, y=0.0, z=0.0),
     fx.Displacement("far_lower", x=0.0, y=0.0, z=0.0),
@@ -104,6 +107,29 @@ def interface_of(scene: fx.Scene) -> fx.Interface:
 def grow_to(scene: fx.Scene, length: float, **controls: Any) -> fx.History:
     """Run until the crack has a length."""
     return scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), length), **controls))
+
+
+def fatigue_law(**options: Any) -> fx.Fatigue:
+    """A fatigue criterion under which the specimen below grows from a = 30 to about 40."""
+    return fx.Fatigue(**({"GIc": 0.4, "paris": PARIS} | options))
+
+
+def fatigue_specimen(
+    comm: MPI.Intracomm = MPI.COMM_WORLD, criterion: Any = None, **options: Any
+) -> fx.Scene:
+    """The bench specimen, coarse, to be fatigued."""
+    return dcb(comm, dx=1.0, ny=2, criterion=criterion or fatigue_law(), **options)
+
+
+def until_length(scene: fx.Scene, length: float) -> fx.CrackLength:
+    """End of a step at a length of the only crack."""
+    return fx.CrackLength(interface_of(scene), length)
+
+
+def growth_curve(history: fx.History, name: str = "bond") -> tuple[Array, Array]:
+    """Crack lengths and the cycles at which they are reached."""
+    rows = [r for r in history if r["event"] in GROWS]
+    return column(rows, f"a[{name}]"), column(rows, "N")
 
 
 def onsets(history: fx.History) -> list[Row]:

@@ -2,65 +2,43 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 import pytest
-from mpi4py import MPI
-from specimens import PINS, STEEL, bond, column, interface_of, largest_imbalance
+from specimens import (
+    GROWS,
+    HALF_OPENING,
+    PARIS,
+    PINS,
+    STEEL,
+    bond,
+    column,
+    fatigue_law,
+    fatigue_specimen,
+    growth_curve,
+    largest_imbalance,
+    until_length,
+)
 
 import fxcrack as fx
 from fxcrack.demos import fatigue_dcb, moment_dcb
 from fxcrack.meshes.dcb import dcb_2d
 
-LAW = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.2, r2=0.9)
-GROWS = ("cycle", "release", "unstable")
-U = 1.0  # of each arm; G = 0.26 at a = 30
-
-
-def fatigue(**options: Any) -> fx.Fatigue:
-    options = {"GIc": 0.4, "paris": LAW} | options
-    return fx.Fatigue(**options)
-
-
-def dcb(comm: Any = MPI.COMM_WORLD, criterion: Any = None, **options: Any) -> fx.Scene:
-    """The bench specimen, coarse, to be fatigued."""
-    mesh = dcb_2d(comm, length=100.0, height=1.5, dx=1.0, ny=2)
-    return fx.Scene(
-        mesh,
-        materials=STEEL,
-        model=fx.PlaneStrain(),
-        supports=PINS,
-        debonds=[fx.Debond(bond(30.0), criterion or fatigue(), **options)],
-    )
-
-
-def until(scene: fx.Scene, length: float) -> fx.CrackLength:
-    return fx.CrackLength(interface_of(scene), length)
-
-
-def curve(history: fx.History, name: str = "bond") -> tuple[np.ndarray, np.ndarray]:
-    """Crack lengths and the cycles at which they are reached."""
-    rows = [r for r in history if r["event"] in GROWS]
-    return column(rows, f"a[{name}]"), column(rows, "N")
-
-
 # --- N(a) -----------------------------------------------------------------------------------------
 
 
 def test_cycles_add_up_to_the_sum_of_the_law():
-    scene = dcb()
-    history = scene.run(fx.Cycles(maximum=U, ratio=0.1, until=until(scene, 40.0)))
+    scene = fatigue_specimen()
+    history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=until_length(scene, 40.0)))
     rows = [r for r in history if r["event"] in GROWS]
-    a, N = curve(history)
+    a, N = growth_curve(history)
     np.testing.assert_allclose(np.diff(a), 1.0, rtol=1e-12)
     dG, G_max = column(rows, "dG[bond]"), column(rows, "G_max[bond]")
     np.testing.assert_allclose(dG, (1.0 - 0.1**2) * G_max, rtol=1e-12)
-    onset = LAW.onset_cycles(dG[0])
-    expected = onset + np.concatenate([[0.0], np.cumsum(1.0 / LAW.growth_rate(dG[:-1]))])
+    onset = PARIS.onset_cycles(dG[0])
+    expected = onset + np.concatenate([[0.0], np.cumsum(1.0 / PARIS.growth_rate(dG[:-1]))])
     np.testing.assert_allclose(N[1:], expected[1:], rtol=1e-11)
     assert (N[0], history.rows[-1]["N"]) == (0.0, N[-1])
-    np.testing.assert_allclose(column(rows, "dadN[bond]"), LAW.growth_rate(dG), rtol=1e-12)
+    np.testing.assert_allclose(column(rows, "dadN[bond]"), PARIS.growth_rate(dG), rtol=1e-12)
     # the same cycles, tip by tip
     tips = history.details["tips"]
     np.testing.assert_allclose(tips["dG"], dG[:-1], rtol=1e-12)
@@ -132,16 +110,18 @@ def test_pure_moments_give_a_straight_line(method):
 
 
 def test_onset_comes_first_and_cycles_may_be_divided_into_steps():
-    scene = dcb(criterion=fatigue(credit=True))
-    whole = curve(scene.run(fx.Cycles(maximum=U, ratio=0.1, until=until(scene, 36.0))))
+    scene = fatigue_specimen(criterion=fatigue_law(credit=True))
+    whole = growth_curve(
+        scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=until_length(scene, 36.0)))
+    )
     scene.close()
-    scene = dcb(criterion=fatigue(credit=True))
-    history = scene.run(fx.Cycles(maximum=U, ratio=0.1, n_max=500.0))
+    scene = fatigue_specimen(criterion=fatigue_law(credit=True))
+    history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, n_max=500.0))
     assert history.reason == "500 cycles done"
     assert [r["event"] for r in history] == ["start", "cycle", "limit", "end"]
     assert scene.fatigue.waiting[0].any()  # N0 = 50/0.256^2 = 763
     for _ in range(20):
-        history = scene.run(fx.Cycles(maximum=U, ratio=0.1, n_max=250.0))
+        history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, n_max=250.0))
     assert history.rows[-1]["N"] == pytest.approx(500.0 + 20 * 250.0)
     rows = [r for r in history if r["event"] == "release"]
     assert len(rows) >= 2
@@ -154,12 +134,12 @@ def test_onset_comes_first_and_cycles_may_be_divided_into_steps():
 
 @pytest.mark.parametrize("credit", [False, True])
 def test_an_element_is_begun_anew_in_each_step_unless_growth_is_credited(credit):
-    scene = dcb(criterion=fatigue(credit=credit))
-    history = scene.run(fx.Cycles(maximum=U, ratio=0.0, n_max=800.0))
+    scene = fatigue_specimen(criterion=fatigue_law(credit=credit))
+    history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.0, n_max=800.0))
     dG = history.rows[-1]["dG[bond]"]
-    onset, element = LAW.onset_cycles(dG), 1.0 / LAW.growth_rate(dG)
+    onset, element = PARIS.onset_cycles(dG), 1.0 / PARIS.growth_rate(dG)
     assert onset < 800.0 < onset + element
-    history = scene.run(fx.Cycles(maximum=U, ratio=0.0, n_max=800.0))
+    history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.0, n_max=800.0))
     (first, *_) = [r for r in history if r["event"] == "release"]
     expected = (onset if credit else 800.0) + element
     assert first["N"] == pytest.approx(expected, rel=1e-9)
@@ -168,7 +148,7 @@ def test_an_element_is_begun_anew_in_each_step_unless_growth_is_credited(credit)
 
 
 def test_beyond_the_upper_limit_one_cycle_per_release():
-    scene = dcb()
+    scene = fatigue_specimen()
     history = scene.run(fx.Cycles(maximum=2.0, ratio=0.1, n_max=1e9))
     rows = [r for r in history if r["event"] in GROWS]
     fast = [r for r in rows if r["event"] == "unstable"]
@@ -185,7 +165,7 @@ def test_beyond_the_upper_limit_one_cycle_per_release():
 
 
 def test_no_growth_below_the_threshold():
-    scene = dcb()
+    scene = fatigue_specimen()
     history = scene.run(fx.Cycles(maximum=0.1, ratio=0.1))
     assert [r["event"] for r in history] == ["start", "cycle", "arrest", "end"]
     assert history.rows[-1]["dadN[bond]"] == 0.0
@@ -196,7 +176,9 @@ def test_equal_extremes_of_g_do_not_grow():
     # above the threshold, but no range: fixed arms and a load elsewhere that cycles
     mesh = dcb_2d(length=60.0, height=1.5, dx=1.0, ny=2)
     open_arms = tuple(
-        fx.Displacement(p.where, x=0.0, y=p.y, amplitude=fx.Amplitude((0.0, 1.0), (0.0, U)))
+        fx.Displacement(
+            p.where, x=0.0, y=p.y, amplitude=fx.Amplitude((0.0, 1.0), (0.0, HALF_OPENING))
+        )
         for p in PINS
     )
     scene = fx.Scene(
@@ -205,7 +187,7 @@ def test_equal_extremes_of_g_do_not_grow():
         model=fx.PlaneStrain(),
         supports=open_arms,
         loads=[fx.PointForce("pin_top", (0.0, 1.0))],
-        debonds=[fx.Debond(bond(30.0), fatigue())],
+        debonds=[fx.Debond(bond(30.0), fatigue_law())],
     )
     history = scene.run(fx.Cycles(maximum=2.0, minimum=1.0))
     assert history.rows[-1]["G_max[bond]"] > 0.2 * 0.4
@@ -223,7 +205,7 @@ def test_a_crack_runs_out_of_its_interface():
         materials=STEEL,
         model=fx.PlaneStrain(),
         supports=[fx.Displacement("top", x=0.0, y=1.0), fx.Displacement("bottom", x=0.0, y=-1.0)],
-        debonds=[fx.Debond(bond(8.0), fatigue())],
+        debonds=[fx.Debond(bond(8.0), fatigue_law())],
     )
     history = scene.run(fx.Cycles(maximum=u, minimum=0.0))
     assert history.reason == "no crack tip is left"
@@ -242,7 +224,7 @@ def test_bodies_that_come_apart_end_the_step():
         model=fx.PlaneStrain(),
         supports=[fx.Displacement("far_lower", x=0.0, y=0.0)],
         loads=[fx.PointForce("pin_top", (0.0, 1.0)), fx.PointForce("pin_bottom", (0.0, -1.0))],
-        debonds=[fx.Debond(bond(30.0), fatigue())],
+        debonds=[fx.Debond(bond(30.0), fatigue_law())],
     )
     history = scene.run(fx.Cycles(maximum=2.5, minimum=0.0))
     assert history.reason.startswith("total separation")
@@ -276,25 +258,25 @@ def test_what_cycles_cannot_be(given, says):
 
 @pytest.mark.mpi
 def test_criterion_and_step_must_go_together(comm):
-    scene = dcb(comm)
+    scene = fatigue_specimen(comm)
     with pytest.raises(fx.InputError, match=r"'bond' has a Fatigue criterion.*run fx.Cycles"):
         scene.run(fx.Static(until=fx.Time(1.0)))
     with pytest.raises(fx.InputError, match="no interface may grow in this step"):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1), grow=[])
     scene.run(fx.Static(until=fx.Time(1.0)), grow=[])  # tied it may be loaded
     scene.close()
-    scene = dcb(comm, criterion=fx.VCCT(GIc=0.2))
+    scene = fatigue_specimen(comm, criterion=fx.VCCT(GIc=0.2))
     with pytest.raises(fx.InputError, match=r"criterion VCCT, which does not grow in cycles"):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1))
     scene.close()
-    scene = dcb(comm, release=fx.Progressive())
+    scene = fatigue_specimen(comm, release=fx.Progressive())
     with pytest.raises(fx.InputError, match=r"let go at once; use release=Step\(\)"):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1))
     scene.close()
 
 
 def test_amplitudes_must_be_cyclic_and_change():
-    scene = dcb()
+    scene = fatigue_specimen()
     with pytest.raises(
         fx.InputError,
         match=r"u\[pin_top.y\] is not cyclic: 0.5 at the beginning and 1.5 at the end",

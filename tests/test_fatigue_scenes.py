@@ -8,7 +8,20 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from specimens import CLAMPED_3D, PINS, STEEL, bond, column, interface_of, largest_imbalance, onsets
+from specimens import (
+    CLAMPED_3D,
+    GROWS,
+    HALF_OPENING,
+    STEEL,
+    bond,
+    column,
+    fatigue_law,
+    fatigue_specimen,
+    growth_curve,
+    largest_imbalance,
+    onsets,
+    until_length,
+)
 
 import fxcrack as fx
 from fxcrack.criteria import total
@@ -16,38 +29,6 @@ from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.enf import enf_2d
 from fxcrack.meshes.penny import penny
-
-LAW = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.2, r2=0.9)
-GROWS = ("cycle", "release", "unstable")
-U = 1.0  # of each arm; G = 0.26 at a = 30
-
-
-def fatigue(**options: Any) -> fx.Fatigue:
-    options = {"GIc": 0.4, "paris": LAW} | options
-    return fx.Fatigue(**options)
-
-
-def dcb(comm: Any = MPI.COMM_WORLD, criterion: Any = None, **options: Any) -> fx.Scene:
-    """The bench specimen, coarse, to be fatigued."""
-    mesh = dcb_2d(comm, length=100.0, height=1.5, dx=1.0, ny=2)
-    return fx.Scene(
-        mesh,
-        materials=STEEL,
-        model=fx.PlaneStrain(),
-        supports=PINS,
-        debonds=[fx.Debond(bond(30.0), criterion or fatigue(), **options)],
-    )
-
-
-def until(scene: fx.Scene, length: float) -> fx.CrackLength:
-    return fx.CrackLength(interface_of(scene), length)
-
-
-def curve(history: fx.History, name: str = "bond") -> tuple[np.ndarray, np.ndarray]:
-    """Crack lengths and the cycles at which they are reached."""
-    rows = [r for r in history if r["event"] in GROWS]
-    return column(rows, f"a[{name}]"), column(rows, "N")
-
 
 # --- the cycle itself -----------------------------------------------------------------------------
 
@@ -77,7 +58,7 @@ def test_end_notched_flexure_with_contact_equals_its_sampled_cycle(ratio):
             fx.Displacement("support_right", x=0.0, y=0.0),
             fx.Displacement("load", y=-1.0),
         ],
-        debonds=[fx.Debond(bond(35.0, contact=True), fatigue(GIc=10.0))],
+        debonds=[fx.Debond(bond(35.0, contact=True), fatigue_law(GIc=10.0))],
     )
     history = scene.run(fx.Cycles(maximum=1.5, ratio=ratio, n_max=1e-6))
     row, loads = history.rows[-1], scene.loads_at(1.5)
@@ -113,7 +94,7 @@ def pressed(comm: Any = MPI.COMM_WORLD) -> fx.Scene:
             fx.Pressure("top", lambda x: np.where(x[0] < 20.0, 0.075, 0.0), press),
             fx.Pressure("bottom", lambda x: np.where(x[0] < 20.0, 0.025, 0.0), press),
         ],
-        debonds=[fx.Debond(bond(30.0, contact=True), fatigue())],
+        debonds=[fx.Debond(bond(30.0, contact=True), fatigue_law())],
     )
 
 
@@ -180,21 +161,23 @@ def stacked(comm: Any, debonds: list[tuple[float, Any]]) -> tuple[fx.Scene, list
 def test_two_interfaces_grow_as_each_would_alone(comm):
     other = fx.Paris(c1=0.0, c2=-1.0, c3=2.0, c4=5.0, r1=0.1, r2=0.9)
     criteria = [
-        fatigue(tolerance=0.0, credit=True),
-        fatigue(tolerance=0.0, credit=True, GIc=0.3, paris=other),
+        fatigue_law(tolerance=0.0, credit=True),
+        fatigue_law(tolerance=0.0, credit=True, GIc=0.3, paris=other),
     ]
     lengths = [30.0, 28.0]
     pairs = list(zip(lengths, criteria, strict=True))
     scene, (first, _) = stacked(comm, pairs)
-    together = scene.run(fx.Cycles(maximum=U, ratio=0.1, until=fx.CrackLength(first, 34.0)))
+    together = scene.run(
+        fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=fx.CrackLength(first, 34.0))
+    )
     scene.close()
     for i in range(2):
         scene, interfaces = stacked(comm, pairs)
         goal = together.rows[-1][f"a[bond{i}]"]
-        step = fx.Cycles(maximum=U, ratio=0.1, until=fx.CrackLength(interfaces[i], goal))
+        step = fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=fx.CrackLength(interfaces[i], goal))
         alone = scene.run(step, grow=[scene.debonds[i]])
-        a, N = curve(alone, f"bond{i}")
-        both, cycles = curve(together, f"bond{i}")
+        a, N = growth_curve(alone, f"bond{i}")
+        both, cycles = growth_curve(together, f"bond{i}")
         first_at = [int(np.argmax(both >= x - 1e-9)) for x in a]
         # credit is exact between releases of one's own: the other specimen does not matter
         np.testing.assert_allclose(cycles[first_at][1:], N[1:], rtol=1e-9)
@@ -206,8 +189,10 @@ def test_two_interfaces_grow_as_each_would_alone(comm):
 
 
 def test_alike_interfaces_let_go_together():
-    scene, interfaces = stacked(MPI.COMM_WORLD, [(30.0, fatigue()), (30.0, fatigue())])
-    history = scene.run(fx.Cycles(maximum=U, ratio=0.1, until=fx.CrackLength(interfaces[0], 33.0)))
+    scene, interfaces = stacked(MPI.COMM_WORLD, [(30.0, fatigue_law()), (30.0, fatigue_law())])
+    history = scene.run(
+        fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=fx.CrackLength(interfaces[0], 33.0))
+    )
     rows = [r for r in history if r["event"] == "release"]
     assert len(rows) == 3
     assert [r["a[bond0]"] for r in rows] == pytest.approx([r["a[bond1]"] for r in rows])
@@ -216,7 +201,7 @@ def test_alike_interfaces_let_go_together():
 
 @pytest.mark.mpi
 def test_static_growth_cycles_and_static_growth_in_turn(comm):
-    scene, (one, _) = stacked(comm, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue())])
+    scene, (one, _) = stacked(comm, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue_law())])
     brittle, tired = scene.debonds
     scene.run(fx.Static(until=fx.CrackLength(one, 33.0)), grow=[brittle])
     before = scene.history.rows[-1]
@@ -235,7 +220,7 @@ def test_static_growth_cycles_and_static_growth_in_turn(comm):
 
 def test_cycles_beside_bonds_that_soften():
     # a progressive front half-way through its elements stays as it is while another one is cycled
-    scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue())])
+    scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue_law())])
     scene.debonds[0] = fx.Debond(one, fx.VCCT(GIc=0.2), release=fx.Progressive())
     brittle, tired = scene.debonds
     scene.run(fx.Static(until=fx.CrackLength(one, 32.0)), grow=[brittle])
@@ -272,13 +257,13 @@ def test_axisymmetric_rates_are_those_of_static_growth(comm):
         )
 
     scene = make(fx.VCCT(GIc=1.0))
-    history = scene.run(fx.Static(until=until(scene, 2.5), stepping="path"))
+    history = scene.run(fx.Static(until=until_length(scene, 2.5), stepping="path"))
     rows = onsets(history)
     a, rate = column(rows, "a[bond]"), 1.0 / column(rows, "time") ** 2  # G at a load factor of 1
     scene.close()
     law = fx.Paris(c1=0.0, c2=-1.0, c3=1.0, c4=3.0, r1=1e-6, r2=0.9)
-    scene = make(fatigue(GIc=1.0, paris=law))
-    history = scene.run(fx.Cycles(maximum=1.0, minimum=0.3, until=until(scene, 2.5)))
+    scene = make(fatigue_law(GIc=1.0, paris=law))
+    history = scene.run(fx.Cycles(maximum=1.0, minimum=0.3, until=until_length(scene, 2.5)))
     rows = [r for r in history if r["event"] in GROWS]
     dG = column(rows, "dG[bond]")[: len(a)]
     np.testing.assert_allclose(dG, 0.91 * rate[: len(dG)], rtol=1e-8)
@@ -296,7 +281,7 @@ def wide(comm: Any, **options: Any) -> fx.Scene:
         materials=STEEL,
         model=fx.Solid(),
         supports=CLAMPED_3D,
-        debonds=[fx.Debond(bond(8.0), fatigue(**options))],
+        debonds=[fx.Debond(bond(8.0), fatigue_law(**options))],
     )
 
 
@@ -304,7 +289,7 @@ def test_a_front_in_3d_stays_symmetric_and_keeps_its_energy():
     law = fx.Paris(c1=0.0, c2=-1.0, c3=0.5, c4=4.0, r1=0.05, r2=0.99)
     for credit in (False, True):
         scene = wide(MPI.COMM_WORLD, GIc=5.0, paris=law, credit=credit)
-        history = scene.run(fx.Cycles(maximum=0.3, ratio=0.1, until=until(scene, 11.0)))
+        history = scene.run(fx.Cycles(maximum=0.3, ratio=0.1, until=until_length(scene, 11.0)))
         x = scene.pairs[0].surface.x
         mirror = np.array([np.argmin(np.abs(x - [p[0], p[1], 8.0 - p[2]]).sum(axis=1)) for p in x])
         is_open = ~scene.model.fronts[0].bonded
@@ -321,7 +306,7 @@ def test_a_front_in_3d_stays_symmetric_and_keeps_its_energy():
 @pytest.mark.mpi
 def test_ranks_agree(comm):
     for make, step in (
-        (dcb, {"maximum": U, "ratio": 0.1, "n_max": 2e4}),
+        (fatigue_specimen, {"maximum": HALF_OPENING, "ratio": 0.1, "n_max": 2e4}),
         (wide, {"maximum": 0.1, "ratio": 0.1, "n_max": 2e4}),
         (pressed, {"period": (0.0, 4.0), "n_max": 2e5}),
     ):
