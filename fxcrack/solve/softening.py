@@ -86,6 +86,7 @@ class SoftSet:
         finished: Energy dissipated by bonds that have opened all the way.
         snaps: Number of unstable states passed.
         snap_steps: Iterations spent on them.
+        solves: Number of equilibria solved for while bonds softened.
     """
 
     def __init__(self, schur: Array) -> None:
@@ -94,6 +95,7 @@ class SoftSet:
         self.finished = 0.0
         self.snaps = 0
         self.snap_steps = 0
+        self.solves = 0
         self._forward = np.zeros((0, 0))
         self._star: Array | None = None
 
@@ -163,6 +165,7 @@ class SoftSet:
 
     def solve(self, right: Array) -> Array:
         """Jumps for given -g*, branches as they are, shape (r,)."""
+        self.solves += 1
         constant, stiffness = self._laws()
         return np.asarray(np.linalg.solve(self.star - stiffness, constant + right))
 
