@@ -14,7 +14,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.effects import Effect, form_terms, plan
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface, make_pair
-from fxcrack.interface.supports import collect_supports
+from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
 from fxcrack.loads import Displacement, Load, Monitor
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
@@ -179,6 +179,8 @@ class Scene:
                 )
         self.model.prepare(active, self._reach(step))
         if not self._started:
+            for pair, held in zip(self.pairs, self.model.held_by_supports, strict=True):
+                warn_of_held_bonds(pair, held)
             self.model.start()
             at_start = self.loads_at(0.0)
             if np.any(at_start):

@@ -8,8 +8,10 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fxcrack import log
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, agree
+from fxcrack.interface.pairing import Pair
 from fxcrack.loads import Displacement
 from fxcrack.mesh.raw import place
 
@@ -106,3 +108,24 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
         # a component that stays zero keeps a column of ones, which gives its reaction
         value[which == i] = 1.0 if not column.moves else value[which == i] / column.scale
     return Supports(tuple(columns), which, value)
+
+
+def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
+    """Warn where supports on both faces keep bonds from ever opening.
+
+    Supports that only stop faces from sliding (planes of symmetry, axes) are the usual case and go
+    without a word.
+
+    Args:
+        pair: Interface.
+        held: Jump components that supports hold, shape (n_nodes, gdim).
+    """
+    stuck = np.flatnonzero(held[:, 0] & pair.bonded)
+    if len(stuck):
+        log.warn(
+            "interface '%s': supports hold both faces at %d of its bonded nodes, one of them at "
+            "%s; those bonds cannot open and show no force",
+            pair.title,
+            len(stuck),
+            place(pair.surface.x[stuck[0]]),
+        )

@@ -28,6 +28,9 @@ from fxcrack.solve.jump_system import Equilibrium
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+_ROUND_OFF = 1e-11
+"""Tractions below this fraction of the largest one count as zero."""
+
 
 @dataclass(frozen=True)
 class Stencil:
@@ -173,7 +176,10 @@ class StressEvaluator(_AtDistance):
         values[rows] = -self.model.system.forces(state, rows)
         traction = self.model.vectors(self.p, stencil.nodes, values)
         traction = stencil(traction / self.surface.areas[stencil.nodes][..., None])
-        return np.asarray(np.einsum("nci,nc->ni", tips.frame, traction))
+        out = np.asarray(np.einsum("nci,nc->ni", tips.frame, traction))
+        # a component that symmetry makes vanish must not become a cause of growth by its round-off
+        out[np.abs(out) < _ROUND_OFF * np.abs(out).max(initial=0.0)] = 0.0
+        return out
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and the stresses s11 (normal), s12 (growth direction) and in 3-D s13 (front)."""

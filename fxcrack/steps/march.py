@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack import log
-from fxcrack.criteria import AmplitudeRelease, Ramp, RateCriterion
+from fxcrack.criteria import AmplitudeRelease, CrackLengthVsTime, Ramp, RateCriterion
 from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.output.history import Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
@@ -242,14 +242,14 @@ class March(Account):
     def _only_round_off(self) -> bool:
         """Whether f under a proportional load is left over from releases, not a real force.
 
-        Arms on their last bonded node may turn freely; only a load thousands of times that of the
-        last release would bring their f, which is round-off, to 1.
+        Arms on their last bonded node may turn freely; only a load thousands of times (with an
+        energy release rate) that of the last release would bring their f, which is round-off, to 1.
         """
         if self.breaks or self.model.system.soft.bonds or self.time <= 0.0:
             return False
-        rates = all(isinstance(g.criterion, RateCriterion) for g in self.growths)
+        by_load = not any(isinstance(g.criterion, CrackLengthVsTime) for g in self.growths)
         released = any(g.n_released for g in self.growths)
-        return rates and released and max(self._largest()) < 1e-8
+        return by_load and released and max(self._largest()) < 1e-8
 
     def _next_guess(self) -> float:
         """A time a little after the one at which f would reach 1 under a proportional load."""
