@@ -47,6 +47,8 @@ class JumpCoordinates:
         n_borders: Number of empty columns, which come last.
         n_inner: Inner coordinates of this rank.
         first: Global number of the first window column.
+        inner_dofs: Owned displacement dof each inner coordinate belongs to, ascending; a free
+            jump takes the place of its slave node's component, shape (n_inner,).
     """
 
     transform: PETSc.Mat
@@ -58,6 +60,7 @@ class JumpCoordinates:
     n_borders: int
     n_inner: int
     first: int
+    inner_dofs: Ints
 
     @property
     def n_last(self) -> int:
@@ -309,8 +312,9 @@ def build_coordinates(
         (n_inner + (extra if comm.rank == 0 else 0), n_columns),
     )  # fmt: skip
     return JumpCoordinates(
-        transform, frames, held, index, n_window, n_supports, n_borders, n_inner, first
-    )
+        transform, frames, held, index, n_window, n_supports, n_borders, n_inner, first,
+        np.flatnonzero(own),
+    )  # fmt: skip
 
 
 def _interface_rows(
