@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.errors import ConvergenceError, SolverError
-from fxcrack.solve.block_matrix import Block, BlockMatrix, column_products, inner_product
+from fxcrack.solve.block_matrix import Block, BlockMatrix, column_products, inner_products
 from fxcrack.solve.petsc_schur import mumps_message
 
 Array = npt.NDArray[np.float64]
@@ -54,10 +54,9 @@ def block_cg(
     x = np.zeros_like(right) if start is None else start
     residual = right.copy() if start is None else right - matrix @ x
     z = precondition(residual).astype(np.float64)
-    error = column_products(comm, residual, z)
     direction = z
     for iteration in range(max_iterations + 1):
-        energy = column_products(comm, x, right) + column_products(comm, x, residual)
+        energy, error = column_products(comm, (x, right + residual), (residual, z))
         limit = allowed(energy)
         if not np.all(np.isfinite(error)):
             raise SolverError(mumps_message(-10, 0))
@@ -66,14 +65,13 @@ def block_cg(
         if iteration == max_iterations:
             break
         product = matrix @ direction
-        inverse = _pseudo_inverse(inner_product(comm, direction, product))
-        step = inverse @ inner_product(comm, direction, residual)
+        gram, pull = inner_products(comm, (direction, product), (direction, residual))
+        inverse = _pseudo_inverse(gram)
+        step = inverse @ pull
         x += direction @ step
         residual -= product @ step
         z = precondition(residual).astype(np.float64)
-        error = column_products(comm, residual, z)
-        z -= direction @ (inverse @ inner_product(comm, product, z))
-        direction = z
+        direction = z - direction @ (inverse @ inner_products(comm, (product, z))[0])
     worst = float(np.sqrt((error / np.maximum(limit, 1e-300)).max()))
     raise ConvergenceError(
         f"the iterative solver stopped after {max_iterations} iterations with an error "
@@ -88,9 +86,10 @@ def _pseudo_inverse(gram: Array) -> Array:
     Raises:
         SolverError: It is not positive.
     """
-    scale = np.sqrt(np.diagonal(gram))
-    if not np.all(scale > 0.0):
-        scale = np.where(scale > 0.0, scale, np.inf)
+    diagonal = np.diagonal(gram)
+    if np.any(diagonal < 0.0):
+        raise SolverError(mumps_message(-10, 0))
+    scale = np.where(diagonal > 0.0, np.sqrt(diagonal), np.inf)
     values, vectors = np.linalg.eigh(gram / scale / scale[:, None])
     if values[0] < -1e-8 * values[-1] or not values[-1] > 0.0:
         raise SolverError(mumps_message(-10, 0))

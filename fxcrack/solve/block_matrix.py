@@ -14,6 +14,7 @@ import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
+Array = npt.NDArray[np.float64]
 Block = npt.NDArray[Any]
 Ints = npt.NDArray[np.int64]
 
@@ -121,18 +122,24 @@ class BlockMatrix:
         return np.asarray(self.local.diagonal())[: self.local.shape[0]]
 
 
-def inner_product(comm: MPI.Intracomm, a: Block, b: Block) -> npt.NDArray[np.float64]:
-    """a^t b over all ranks, shape (k_a, k_b); collective, the same on every rank."""
-    out = np.asarray(a.T @ b, dtype=np.float64)
-    if comm.size > 1:
-        out = np.ascontiguousarray(out)
-        comm.Allreduce(MPI.IN_PLACE, out)
-    return out
+def inner_products(comm: MPI.Intracomm, *pairs: tuple[Block, Block]) -> Array:
+    """a^t b of some pairs of blocks of k columns over all ranks, shape (n_pairs, k, k).
+
+    Collective, the same on every rank.
+    """
+    return _summed(comm, np.stack([a.T @ b for a, b in pairs]))
 
 
-def column_products(comm: MPI.Intracomm, a: Block, b: Block) -> npt.NDArray[np.float64]:
-    """a_j . b_j over all ranks, shape (k,); collective, the same on every rank."""
-    out = np.einsum("ij,ij->j", a, b).astype(np.float64)
+def column_products(comm: MPI.Intracomm, *pairs: tuple[Block, Block]) -> Array:
+    """a_j . b_j of some pairs of blocks of k columns over all ranks, shape (n_pairs, k).
+
+    Collective, the same on every rank.
+    """
+    return _summed(comm, np.stack([np.einsum("ij,ij->j", a, b) for a, b in pairs]))
+
+
+def _summed(comm: MPI.Intracomm, local: Block) -> Array:
+    out = np.ascontiguousarray(local, dtype=np.float64)
     if comm.size > 1:
         comm.Allreduce(MPI.IN_PLACE, out)
     return out

@@ -36,6 +36,8 @@ BLOCK = 32
 """Columns solved together: more share more directions, but leave the cache."""
 _FLOOR = 1e-6
 """Least energy of a column over that of its own coordinate: rigid motions have none."""
+_FIELD = 0.1
+"""Tolerance of displacements over that of columns: they feel the error itself, not its square."""
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,8 @@ class ColumnSpace:
 
         def allowed(energy: Array) -> Array:
             rest = np.abs(diagonal - energy)
-            return self.rtol**2 * np.maximum(rest, _FLOOR * np.maximum(diagonal, energy))
+            out: Array = self.rtol**2 * np.maximum(rest, _FLOOR * np.maximum(diagonal, energy))
+            return out
 
         x, residual, iterations = block_cg(self.matrix, self.multigrid, right, allowed)
         self.iterations.append(iterations)
@@ -169,7 +172,9 @@ class ColumnSpace:
         stored_energy = abs(float(values @ self.schur @ values))
 
         def allowed(energy: Array) -> Array:
-            return self.rtol**2 * np.maximum(stored_energy, _FLOOR * np.abs(energy))
+            least = np.maximum(stored_energy, _FLOOR * np.abs(energy))
+            out: Array = (_FIELD * self.rtol) ** 2 * least
+            return out
 
         x, _, _ = block_cg(self.matrix, self.multigrid, right, allowed, start=start)
         transform = self.coordinates.transform
@@ -184,7 +189,8 @@ class ColumnSpace:
     def on_window(self, n_borders: int) -> Array:
         """What each border holds in the window rows, shape (n_window, n_borders)."""
         n, first = self.coordinates.n_window, self.coordinates.n_last - n_borders
-        return np.asarray(self._corner[:n, first:].toarray())
+        out: Array = self._corner[:n, first:].toarray()
+        return out
 
     def destroy(self) -> None:
         """Free the transformation; collective."""
@@ -214,36 +220,31 @@ def _split(
         (np.ones(n_inner), (slots, np.arange(n_inner))), shape=(continuum.n_local, n_inner)
     )
     coupling = (spread @ rows[:n_inner, continuum.n_global :]).tocsc()
-    corner = sp.lil_matrix((n_last, n_last))
-    if comm.rank == 0:
-        corner = rows[n_inner:, continuum.n_global :].tolil()
+    corner = rows[n_inner:, continuum.n_global :]  # on rank 0; empty elsewhere
     right = coordinates.transform.createVecRight()
     dense = np.zeros((continuum.n_local, len(borders)))
+    edge = sp.lil_matrix((n_last, n_last))
     for i, border in enumerate(borders):
         coordinates.transform.multTranspose(border, right)
         dense[slots, i] = right.array[:n_inner]
         if comm.rank == 0:
-            corner[:n_first, n_first + i] = right.array[n_inner : n_inner + n_first, None]
-            corner[n_first + i, :n_first] = right.array[n_inner : n_inner + n_first]
+            edge[n_first + i, :n_first] = right.array[n_inner : n_inner + n_first]
     right.destroy()
     if borders:
         coupling = sp.hstack([coupling[:, :n_first], sp.csc_matrix(dense)], format="csc")
     inner = (spread @ rows[:n_inner, : continuum.n_global]).tocsr()
     del rows
-    total = comm.allreduce(float(inner.data.sum() if not n_inner else _diagonal_sum(continuum, inner)))
-    mean = total / max(comm.allreduce(n_inner), 1)
+    own = inner[:, continuum.offset : continuum.offset + continuum.n_local]
+    mean = comm.allreduce(float(own.diagonal().sum())) / max(comm.allreduce(n_inner), 1)
     left = np.setdiff1d(np.arange(continuum.n_local), slots)
     unit = sp.csr_matrix(
         (np.full(len(left), mean), (left, continuum.offset + left)), shape=inner.shape
     )
     inner = (inner + unit).tocsr()
     inner.sort_indices()
-    return _Parts(inner, coupling, comm.bcast(sp.csr_matrix(corner)))
-
-
-def _diagonal_sum(continuum: Continuum, inner: sp.csr_matrix) -> float:
-    own = inner[:, continuum.offset : continuum.offset + continuum.n_local]
-    return float(own.diagonal().sum())
+    edge = edge.tocsr()
+    whole = corner + edge + edge.T if comm.rank == 0 else None
+    return _Parts(inner, coupling, sp.csr_matrix(comm.bcast(whole)))
 
 
 def _places(
@@ -266,7 +267,7 @@ def _places(
 
 
 def _motions(continuum: Continuum, coordinates: JumpCoordinates) -> Array:
-    """Rigid motions in jump coordinates on the owned dofs: jumps, and places left over, are zero."""
+    """Rigid motions in jump coordinates on the owned dofs; jumps and places left over are zero."""
     indptr, _, _ = coordinates.transform.getValuesCSR()
     motions = rigid_motions(continuum)
     inner = np.zeros(continuum.n_local, dtype=bool)

@@ -18,7 +18,7 @@ from scipy.linalg import cho_solve
 
 from fxcrack import log
 from fxcrack.continuum import Continuum
-from fxcrack.errors import SolverError
+from fxcrack.errors import InputError, SolverError
 from fxcrack.interface.front import Front, Tips
 from fxcrack.interface.jumps import WINDOW, JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair
@@ -26,11 +26,12 @@ from fxcrack.interface.supports import Supports
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
+from fxcrack.solve.iterative_condensation import ColumnStore, IterativeCondensation, Roles
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work, work_between
 from fxcrack.solve.petsc_schur import mumps_message
 from fxcrack.solve.rigid import check_held
 from fxcrack.solve.softening import SoftBond
-from fxcrack.solve.window import CostModel, choose_roles
+from fxcrack.solve.window import ColumnCost, CostModel, choose_roles
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -39,20 +40,39 @@ _UNBOUNDED = 1e100
 """Jump per force of a unit that holds a body alone."""
 
 
+METHODS = ("auto", "schur", "columns", "iterative")
+
+
 @dataclass(frozen=True)
 class CondensedOptions:
     """How the condensation is done.
 
     Args:
-        method: "auto", "schur" or "columns" (see :class:`Condensation`).
-        window_mb: Memory the dense matrices of the window may take, MB.
+        method: "schur", "columns" (both factor the bodies, see :class:`Condensation`), "iterative"
+            (columns by conjugate gradients with multigrid, no factorisation: for 3-D models too
+            large for one) or "auto": "schur" where it is available.
+        window_mb: Memory the dense matrices of the window may take, and the stored columns of
+            "iterative" before old ones are dropped, MB.
         rows: Force the window to reach at most this distance ahead of the front (length);
             ``None`` lets the cost model decide.
+        rtol: "iterative" only: energy norm of a column's error over that of the column. The error
+            of S is its square.
+
+    Raises:
+        InputError: The method is unknown or the tolerance makes no sense.
     """
 
     method: str = "auto"
     window_mb: float = 2000.0
     rows: float | None = None
+    rtol: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            names = ", ".join(f"'{m}'" for m in METHODS)
+            raise InputError(f"method = '{self.method}': choose one of {names}")
+        if not 1e-12 <= self.rtol <= 1e-2:
+            raise InputError(f"rtol = {self.rtol}: choose a tolerance from 1e-12 to 1e-2")
 
 
 class CondensedModel:
@@ -102,9 +122,15 @@ class CondensedModel:
         self._soft: list[SoftBond] = []
         self._taken = 0.0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
+        self._column_cost = ColumnCost.guess(continuum.n_global)
+        self._columns: ColumnStore | None = None
+        if options.method == "iterative":
+            self._columns = ColumnStore(
+                continuum, pairs, supports, rtol=options.rtol, cap_mb=options.window_mb
+            )
         self._stiffness: PETSc.Mat | None = None
         self._borders: list[PETSc.Vec] = []
-        self._condensation: Condensation | None = None
+        self._condensation: Condensation | IterativeCondensation | None = None
         self.system: JumpSystem
         self.state: Equilibrium
 
@@ -163,7 +189,7 @@ class CondensedModel:
             self.fronts,
             self.active,
             reach,
-            self._cost,
+            self._cost if self._columns is None else self._column_cost,
             around=self.around,
             keep=[*(b.where[:2] for b in self._soft), *self.keep],
             cap_mb=self.options.window_mb,
@@ -172,6 +198,8 @@ class CondensedModel:
         if self._condensation is not None:
             self._condensation.destroy()
             self._condensation = None
+        if self._columns is not None:
+            return self._condense_by_columns(self._columns, roles)
         start = time.perf_counter()
         coordinates = build_coordinates(
             self.continuum, self.pairs, roles, self.supports, len(self._borders)
@@ -182,20 +210,40 @@ class CondensedModel:
     def _condense(self, coordinates: JumpCoordinates) -> None:
         """Factor, and set up the dense system of the window; collective."""
         assert self._stiffness is not None
-        start = time.perf_counter()
-        self._condensation = Condensation(
-            self._stiffness,
-            coordinates,
-            self._borders,
-            self.timings,
-            method=self.options.method,
-        )
-        seconds = self.continuum.comm.bcast(time.perf_counter() - start)
-        self._cost.observe(coordinates.n_window, seconds)
+        if self._columns is None:
+            start = time.perf_counter()
+            self._condensation = Condensation(
+                self._stiffness,
+                coordinates,
+                self._borders,
+                self.timings,
+                method=self.options.method,
+            )
+            seconds = self.continuum.comm.bcast(time.perf_counter() - start)
+            self._cost.observe(coordinates.n_window, seconds)
+        assert self._condensation is not None
         self.system = JumpSystem(
             self._condensation.schur, coordinates.n_window, self.n_loads, len(self.loads)
         )
         self._face_loads = -self._condensation.borders_on_window[:, : len(self.loads)]
+
+    def _condense_by_columns(self, columns: ColumnStore, roles: Roles) -> JumpCoordinates:
+        """Coordinates of the window with S on them, no factorisation; collective."""
+        assert self._stiffness is not None
+        may_open = []
+        for pair, front, on in zip(self.pairs, self.fronts, self.active, strict=True):
+            later = np.zeros((pair.surface.n_nodes, self.continuum.gdim), dtype=bool)
+            later[front.bonded & pair.paired] = on
+            if pair.interface.normal_only:
+                later[:, 1:] = False
+            may_open.append(later)
+        start = time.perf_counter()
+        made = columns.condense(roles, may_open, self._stiffness, self._borders, self.timings)
+        spent = self.continuum.comm.bcast((made.column_seconds, time.perf_counter() - start))
+        self._column_cost.observe(made.computed, *spent)
+        self._condensation = made
+        log.info("%d new columns in %.2f s", made.computed, made.column_seconds)
+        return made.coordinates
 
     def _restore_states(self) -> None:
         """Free what is open in the new window, soften what softens, mark what may touch."""
@@ -534,6 +582,8 @@ class CondensedModel:
         if self._condensation is not None:
             self._condensation.destroy()
             self._condensation = None
+        if self._columns is not None:
+            self._columns.destroy()
         for vector in self._borders:
             vector.destroy()
         if self._stiffness is not None:

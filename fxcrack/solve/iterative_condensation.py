@@ -22,8 +22,8 @@ from fxcrack.interface.jumps import HELD, INNER, WINDOW, JumpCoordinates, build_
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solve.column_space import ColumnSpace
+from fxcrack.solve.condensation import Timings
 from fxcrack.solve.petsc_schur import mumps_message
-from fxcrack.solve.timings import Timings
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -18,6 +18,8 @@ from fxcrack.solve.petsc_schur import mumps_message
 
 Array = npt.NDArray[np.float64]
 
+_PREFIX = "fxcrack_gamg_"
+_BOTTOM = 400  # unknowns a dense factor solves for sooner than more levels do
 _DEGREE = 2
 _LOWEST = 0.1  # the polynomial damps eigenvalues above this part of the largest
 _SAFETY = 1.1  # the power method comes from below
@@ -49,7 +51,10 @@ class Multigrid:
         space = PETSc.NullSpace().create(vectors=vectors, comm=matrix.getComm())
         matrix.setNearNullSpace(space)
         pc = PETSc.PC().create(matrix.getComm())
-        pc.setOptionsPrefix("fxcrack_gamg_")
+        pc.setOptionsPrefix(_PREFIX)
+        options = PETSc.Options(_PREFIX)
+        if not options.hasName("pc_gamg_coarse_eq_limit"):
+            options["pc_gamg_coarse_eq_limit"] = _BOTTOM
         pc.setOperators(matrix)
         pc.setType(PETSc.PC.Type.GAMG)
         pc.setFromOptions()
@@ -67,9 +72,7 @@ class Multigrid:
         pc.destroy()
         for thing in (space, *vectors):
             thing.destroy()
-        self._inverse = [
-            (1.0 / a.diagonal()).astype(np.float32)[:, None] for a in self._levels
-        ]
+        self._inverse = [(1.0 / a.diagonal()).astype(np.float32)[:, None] for a in self._levels]
         self._largest = [
             _SAFETY * _largest_eigenvalue(a, d)
             for a, d in zip(self._levels, self._inverse, strict=True)

@@ -2,8 +2,10 @@
 
 Ahead of the front the window holds the bonded nodes the crack may reach before the next rebase;
 behind it, the wake the criterion looks at; with contact, all open normals. How far it reaches is
-the number of nodes k that makes  ceil(L/k) (t_plain + c n(k)^2)  smallest: L nodes to go, n window
-components, c the cost of an entry of S, refitted from the last factorisation.
+the number of nodes k that costs least. With a factorisation per window:
+ceil(L/k) (t_plain + c n(k)^2), L nodes to go, n window components, c the cost of an entry of S.
+With columns by iteration, each computed once: (L/k) t_window + t_column (n(k) - n(0))/2, the last
+window being half used on average. The constants are refitted from what was measured last.
 """
 
 from __future__ import annotations
@@ -73,12 +75,53 @@ class CostModel:
         return int(np.argmin(seconds)) + 1
 
 
+@dataclass
+class ColumnCost:
+    """Seconds where columns of S are computed by iteration, each once.
+
+    The constants start from 3-D problems of `fxcrack bench scale` on one core and are replaced by
+    :meth:`observe`.
+
+    Attributes:
+        column: Seconds of a column.
+        window: Seconds of a new window without columns.
+    """
+
+    column: float
+    window: float
+
+    @classmethod
+    def guess(cls, n_dofs: int) -> ColumnCost:
+        """Constants before anything was measured."""
+        return cls(column=2e-6 * n_dofs, window=0.02)
+
+    def observe(self, n_columns: int, column_seconds: float, seconds: float) -> None:
+        """Take over measured times.
+
+        Args:
+            n_columns: Columns computed for the last window.
+            column_seconds: Seconds they took.
+            seconds: Seconds of the window in all.
+        """
+        if n_columns:
+            self.column = column_seconds / n_columns
+        self.window = max(seconds - column_seconds, 1e-4)
+
+    def reach(self, counts: npt.NDArray[np.int64]) -> int:
+        """Best number of candidate nodes to take; see :meth:`CostModel.reach`."""
+        if not len(counts):
+            return 0
+        k = np.arange(1, len(counts) + 1)
+        wasted = 0.5 * self.column * (counts - counts[0]).astype(float)
+        return int(np.argmin(self.window * len(counts) / k + wasted)) + 1
+
+
 def choose_roles(
     pairs: list[Pair],
     fronts: list[Front],
     active: list[bool],
     reach: list[float],
-    cost: CostModel,
+    cost: CostModel | ColumnCost,
     *,
     around: list[tuple[float, float]] | None = None,
     keep: Sequence[tuple[int, int]] = (),
