@@ -17,6 +17,7 @@ from specimens import STEEL, assert_same, bond, dcb, gathered_vector, grow_to, s
 
 import fxcrack as fx
 from fxcrack.continuum import Continuum
+from fxcrack.effects import FiniteStrain
 from fxcrack.errors import ConvergenceError, InputError, SolverError
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
@@ -302,3 +303,9 @@ def test_window_of_columns(column: float, window: float, steps: list[int]) -> No
     cost = ColumnCost.guess(1000)
     cost.observe(10, 2.0, 2.5)
     assert (cost.column, cost.window) == (0.2, 0.5)
+
+
+@pytest.mark.mpi
+def test_nonlinear_bodies_are_factored(comm: MPI.Intracomm) -> None:
+    with pytest.raises(InputError, match="needs linear bodies; use method='auto'"):
+        dcb(comm, dx=2.0, ny=1, options=ITERATIVE, effects=[FiniteStrain()])

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from petsc4py import PETSc
 
 from fxcrack.continuum import Continuum
-from fxcrack.errors import ConvergenceError
+from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.interface.jumps import JumpCoordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.replica import JumpReader
@@ -74,6 +74,9 @@ class NewtonModel(CondensedModel):
         bodies: The form terms.
         newton: Controls of the iteration.
 
+    Raises:
+        InputError: The options ask for a way to condense that only linear bodies allow.
+
     Attributes:
         u: Accepted displacement, owned dofs.
         counts: Solves and iterations so far.
@@ -94,6 +97,11 @@ class NewtonModel(CondensedModel):
         bodies: Bodies,
         newton: NewtonOptions,
     ) -> None:
+        if options.method == "iterative":
+            raise InputError(
+                "method='iterative' keeps its columns while the crack grows, which needs linear "
+                "bodies; use method='auto' with nonlinear ones"
+            )
         super().__init__(continuum, pairs, supports, loads, monitors, options)
         self.bodies = bodies
         self.newton = newton
@@ -147,7 +155,7 @@ class NewtonModel(CondensedModel):
     @property
     def condensation(self) -> Condensation:
         """The condensed tangent."""
-        assert self._condensation is not None
+        assert isinstance(self._condensation, Condensation)
         return self._condensation
 
     def _factor(self) -> None:
