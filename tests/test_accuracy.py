@@ -238,3 +238,18 @@ def test_cycles_feel_the_power_of_the_law() -> None:
     assert estimate.cycles is not None
     assert estimate.cycles > 5.0 * estimate.G
     case.scene.close()
+
+
+def test_the_demos_own_study_in_3d() -> None:
+    from fxcrack.demos import accuracy
+
+    case = accuracy.dcb3d(Setting(size=2.0, cell="hexahedron"))
+    history = case.scene.run(case.step, progress=False)
+    found = case.measure(history)
+    case.scene.close()
+    assert history.details["releases"] == 0
+    assert found.load is not None
+    assert found.G is not None
+    # the coarsest mesh is 5 % off in load; the mean of G over the width at 50 N follows from it
+    assert found.load == pytest.approx(62.1, rel=0.08)
+    assert found.G == pytest.approx(accuracy.G_IC * (50.0 / found.load) ** 2, rel=1e-6)

@@ -17,6 +17,10 @@ _GUESS = 1.2
 """Exponent of the cost in the unknowns while too little is known."""
 _POSSIBLE = (0.8, 1.8)
 """Exponents outside are noise or overheads: large problems cost between n and n^1.8."""
+FIT_POINTS = 4
+"""The largest problems of a line tell its exponents,"""
+FIT_RANGE = 1.5
+"""those within so many decades below the largest."""
 _FIRST = 0.5
 """Seconds for a setting before anything is known."""
 

@@ -36,21 +36,21 @@ def place(
     bounds: Box,
     *,
     points: Array | None = None,
-    boxes: Sequence[Box] = (),
+    segments: Sequence[tuple[Array, Array]] = (),
     radius: float = 5.0,
     scale: float = 1.0,
 ) -> list[Box]:
     """Boxes for labels, one beside each anchor.
 
-    Labels are placed one after the other, each where it covers no other label, no given box, no
-    leader of another label and as few points as possible, near its anchor.
+    Labels are placed one after the other, each where it covers no other label, no leader of
+    another label and as few points and drawn lines as possible, near its anchor.
 
     Args:
         anchors: Points to be labelled, shape (n, 2).
         sizes: Width and height of each label.
         bounds: Where labels must stay.
         points: Other points to keep free, shape (m, 2).
-        boxes: Regions to keep free.
+        segments: Drawn lines, by their ends, that labels should not cover.
         radius: Half width of a point.
         scale: Factor on distances.
     """
@@ -64,7 +64,7 @@ def place(
             if taste >= least:
                 break  # what comes now is no better even if it covers nothing
             box = _beside(anchor, width, height, angle, distance * scale)
-            cost = taste + _trouble(box, anchor, bounds, [*placed, *boxes], spots, leaders)
+            cost = taste + _trouble(box, anchor, bounds, placed, spots, leaders, segments)
             if cost < least:
                 least, best = cost, box
         placed.append(best)
@@ -92,6 +92,7 @@ def _trouble(
     taken: Sequence[Box],
     spots: Sequence[Box],
     leaders: Sequence[tuple[Array, Array]],
+    segments: Sequence[tuple[Array, Array]],
 ) -> float:
     """What a box would cover or cross, weighed."""
     wide = (box[0] - _GAP, box[1] - _GAP, box[2] + _GAP, box[3] + _GAP)
@@ -99,6 +100,7 @@ def _trouble(
     trouble = 1e3 * (area - overlap(box, bounds)) / area
     trouble += sum(1e3 for other in taken if overlap(wide, other) > 0.0)
     trouble += sum(60.0 for spot in spots if overlap(box, spot) > 0.0)
+    trouble += sum(25.0 for a, b in segments if _covers(box, a, b))
     leader = (np.asarray(anchor, dtype=float), nearest(box, anchor))
     for a, b in leaders:
         trouble += 200.0 * _cross(leader, (a, b)) + 300.0 * _hits(wide, a, b)
@@ -112,6 +114,12 @@ def _hits(box: Box, a: Array, b: Array) -> bool:
         if box[0] < x < box[2] and box[1] < y < box[3]:
             return True
     return False
+
+
+def _covers(box: Box, a: Array, b: Array) -> bool:
+    """Whether a segment along an axis lies partly in a box."""
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    return bool(low[0] < box[2] and high[0] > box[0] and low[1] < box[3] and high[1] > box[1])
 
 
 def _cross(one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-GAIN = 0.03
+GAIN = 0.05
 """Share of the error that a dearer setting must save to be on the front."""
 TARGETS = (0.05, 0.01, 0.001)
 """Accuracies for which the cheapest setting is named."""

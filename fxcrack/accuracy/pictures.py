@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -14,6 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from mpi4py import MPI
 
+from fxcrack.accuracy.fit import FIT_POINTS, FIT_RANGE
 from fxcrack.accuracy.labels import Box, nearest, place
 from fxcrack.accuracy.pareto import TARGETS
 from fxcrack.accuracy.study import Setting
@@ -63,7 +66,7 @@ def error_figure(result: Result) -> Figure:
     figure, ax = new_figure(8.6, 5.4)
     _logarithmic(ax, "seconds from mesh to result", "error")
     good = np.isfinite(y)
-    _limits(ax, x[good], y[good], left=0.75)
+    _limits(ax, x[good], y[good], left=0.3)
     _targets(ax)
     _blur(ax, result["uncertainty"])
     lines: dict[Setting, list[int]] = {}
@@ -84,19 +87,44 @@ def error_figure(result: Result) -> Figure:
             markersize=9.0, markeredgecolor=INK, markeredgewidth=1.2, zorder=5,
         )  # fmt: skip
     _explain(ax, settings)
-    source = result["reference"]["source"].partition(":")[0]
-    counted = "load, G, length: the worst" if result["measure"] == "worst" else result["measure"]
     ax.set_title(
-        f"{result['title']}\n", fontsize=11.5, color=INK, loc="left", pad=4, fontweight="bold"
+        f"{_sentence(result['title'])}\n",
+        fontsize=11.5,
+        color=INK,
+        loc="left",
+        pad=4,
+        fontweight="bold",
     )
     ax.text(
-        0.0, 1.015, f"error of {counted}, from {source}", transform=ax.transAxes, fontsize=9.5,
-        color=GREY, va="bottom",
+        0.0, 1.015, _counted(result), transform=ax.transAxes, fontsize=9.5, color=GREY,
+        va="bottom",
     )  # fmt: skip
     unit = f" {result['unit']}" if result["unit"] else ""
     texts = [f"{settings[i].title}, {settings[i].size:g}{unit}" for i in front]
-    _label(figure, ax, np.column_stack([x[front], y[front]]), texts, np.column_stack([x, y])[good])
+    corners = np.repeat(np.column_stack([x[front], y[front]]), 2, axis=0)
+    corners[1:-1:2, 0] = x[front][1:]  # the front goes right, then down
+    right = ax.get_xlim()[1]
+    targets = [np.array([[right * 1e-9, t], [right, t]]) for t in TARGETS]
+    _label(
+        figure, ax, np.column_stack([x[front], y[front]]), texts, np.column_stack([x, y])[good],
+        [corners, *targets],
+    )  # fmt: skip
     return figure
+
+
+def _counted(result: Result) -> str:
+    """Of what the error is and where it is counted from."""
+    source = result["reference"]["source"].partition(":")[0]
+    if result["measure"] != "worst":
+        return f"error of {result['measure']}, counted from {source}"
+    names = {"load": "critical load", "G": "G", "length": "crack length"}
+    found = [words for name, words in names.items() if name in result["reference"]["values"]]
+    what = f"largest error of {', '.join(found[:-1])} and {found[-1]}" if found[1:] else found[0]
+    return f"{what}, counted from {source}"
+
+
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
 
 
 def _kind(setting: Setting, base: Setting) -> str:
@@ -126,13 +154,17 @@ def _logarithmic(ax: Axes, xlabel: str, ylabel: str) -> None:
     ax.set_axisbelow(True)
     ax.set_xlabel(xlabel, fontsize=10.5, color=INK, labelpad=5)
     ax.set_ylabel(ylabel, fontsize=10.5, color=INK, labelpad=5)
-    ax.xaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+    ax.xaxis.set_major_formatter(FuncFormatter(_plain))
     ax.xaxis.set_minor_formatter(NullFormatter())
     ax.yaxis.set_minor_formatter(NullFormatter())
     if ylabel == "error":
         ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{100.0 * v:g} %"))
     else:
-        ax.yaxis.set_major_formatter(FuncFormatter(lambda v, _: f"{v:g}"))
+        ax.yaxis.set_major_formatter(FuncFormatter(_plain))
+
+
+def _plain(value: float, _: Any = None) -> str:
+    return f"{value:,.0f}" if value >= 1e3 else f"{value:g}"
 
 
 def _limits(ax: Axes, x: Array, y: Array, *, left: float) -> None:
@@ -172,7 +204,7 @@ def _explain(ax: Axes, settings: list[Setting]) -> None:
     seen = {_colour(s): s for s in reversed(settings)}
     for colour in COLOURS:
         if colour in seen:
-            name = f"{seen[colour].title.partition(',')[0]}s"
+            name = f"{seen[colour].title.partition(',')[0]}s".replace("hexs", "hexes")
             handles.append(
                 Line2D([], [], color=colour, marker="o", markersize=6, linewidth=0.9, label=name)
             )
@@ -187,12 +219,14 @@ def _explain(ax: Axes, settings: list[Setting]) -> None:
             )  # fmt: skip
     ax.legend(
         handles=handles, frameon=False, fontsize=9, labelcolor=INK, loc="upper left",
-        bbox_to_anchor=(1.055, 1.0), borderaxespad=0.0,
+        bbox_to_anchor=(1.08, 1.0), borderaxespad=0.0,
     )  # fmt: skip
 
 
-def _label(figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: Array) -> None:
-    """Write a label beside each anchor, with a line to it."""
+def _label(
+    figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: Array, paths: list[Array]
+) -> None:
+    """Write a label beside each anchor, with a line to it, off points and paths."""
     canvas: Any = FigureCanvasAgg(figure)
     canvas.draw()
     figure.set_layout_engine("none")  # the places found below belong to this layout
@@ -204,10 +238,13 @@ def _label(figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: A
         sizes.append((box.width, box.height))
         text.remove()
     frame = ax.get_window_extent(renderer)
+    _make_room(ax, anchors[:, 0], [(width + 45.0) / frame.width for width, _ in sizes])
     bounds: Box = (frame.x0 + 4, frame.y0 + 4, frame.x1 - 2, frame.y1 - 2)
     at = ax.transData.transform(anchors)
+    pixels = [ax.transData.transform(path) for path in paths]
+    segments = [(a, b) for path in pixels for a, b in itertools.pairwise(path)]
     placed = place(
-        at, sizes, bounds, points=ax.transData.transform(points), radius=8.0,
+        at, sizes, bounds, points=ax.transData.transform(points), segments=segments, radius=8.0,
         scale=figure.dpi / 100.0,
     )  # fmt: skip
     back = ax.transAxes.inverted()
@@ -218,7 +255,18 @@ def _label(figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: A
         ax.text(
             x, y, words, fontsize=8.5, color=INK, ha="center", va="center",
             transform=ax.transAxes, zorder=6,
+            path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white")],
         )  # fmt: skip
+
+
+def _make_room(ax: Axes, x: Array, shares: list[float]) -> None:
+    """Move the left end so that a label of some share of the width fits left of each x."""
+    low, high = np.log10(ax.get_xlim())
+    at = np.log10(x)
+    for middle, share in zip(at, shares, strict=True):
+        # (place - low)/(high - low) >= share
+        low = min(low, float((middle - share * high) / (1.0 - share)))
+    ax.set_xlim(10**low, 10**high)
 
 
 # -- cost against size ---------------------------------------------------------------
@@ -235,7 +283,7 @@ def cost_figure(result: Result) -> Figure:
     figure = Figure(figsize=(10.4, 4.3), dpi=160, layout="constrained", facecolor="white")
     left, right = figure.subplots(1, 2)
     _logarithmic(left, "dofs", "seconds")
-    _logarithmic(right, "dofs", "peak memory above that of Python and libraries / MB")
+    _logarithmic(right, "dofs", "MB")
     largest = max(lines, key=lambda k: max(records[i]["dofs"] for i in lines[k]), default=None)
     if largest is None:
         return figure
@@ -248,7 +296,11 @@ def cost_figure(result: Result) -> Figure:
         values = np.array([records[i]["phases"].get(phase, 0.0) for i in at])
         if values.max(initial=0.0) > 0.02 * whole.max():
             _series(left, dofs, values, fits.get(phase), name, colour, 1.3)
-    left.set_title(f"{largest}: time by phase", fontsize=11, color=INK, loc="left", pad=8)
+    figure.suptitle(
+        f"{_sentence(result['title'])}: cost against size", fontsize=11.5, color=INK, x=0.01,
+        ha="left", fontweight="bold",
+    )  # fmt: skip
+    left.set_title(f"time by phase, {largest}", fontsize=10.5, color=GREY, loc="left", pad=6)
     left.legend(frameon=False, fontsize=8.5, labelcolor=INK, loc="upper left")
     shown = 0
     for title, places in lines.items():
@@ -261,7 +313,10 @@ def cost_figure(result: Result) -> Figure:
         fit = result["exponents"][title].get("memory")
         _series(right, dofs, memory, fit, title, _colour(setting), 1.3)
         shown += 1
-    right.set_title("memory", fontsize=11, color=INK, loc="left", pad=8)
+    right.set_title(
+        "peak memory, that of Python and libraries apart", fontsize=10.5, color=GREY, loc="left",
+        pad=6,
+    )  # fmt: skip
     right.legend(frameon=False, fontsize=8.5, labelcolor=INK, loc="upper left")
     for ax in (left, right):  # room for the legend
         low, high = ax.get_ylim()
@@ -279,6 +334,7 @@ def _series(
     if fit is None:
         ax.plot([], [], "o-", color=colour, markersize=4.5, label=label)
         return
-    ends = np.array([max(x.min(), x.max() / 30.0), x.max()])
+    fitted = x[x >= x.max() / 10**FIT_RANGE][-FIT_POINTS:]
+    ends = fitted[[0, -1]]
     ax.plot(ends, fit["factor"] * ends ** fit["exponent"], color=colour, linewidth=width, zorder=2)
     ax.plot([], [], "o-", color=colour, markersize=4.5, linewidth=width, label=label)

@@ -2,7 +2,8 @@
 
 The second needs no theory: on each line of settings that differ in size alone, the values are
 extrapolated to size zero, v(h) = v0 + c h^p. The line with the smallest correction is the
-reference, and how far the next best lines are from it says how well it is known.
+reference. How far the next best lines are from it, if they come near it at all, says how well it
+is known; else the correction itself does.
 """
 
 from __future__ import annotations
@@ -17,6 +18,8 @@ MAIN = ("load", "G", "length")
 """Quantities whose largest error counts by default."""
 _OTHERS = 2
 """How many lines beside the best say how well it is known."""
+_COMPARABLE = 3.0
+"""Corrections larger than so many times the best line's say nothing about it."""
 _TOLD = 3
 """Sizes a line needs to be trusted; two are taken only where no line has more."""
 
@@ -81,7 +84,12 @@ def own_reference(runs: Sequence[tuple[Setting, Values]], stepping: str) -> Refe
         return None
     limits.sort(key=lambda entry: entry[0])
     _, line, sizes, limit, shares = limits[0]
-    beside = [other for _, _, points, other, _ in limits[1:] if len(points) >= _TOLD][:_OTHERS]
+    near = _COMPARABLE * limits[0][0]
+    beside = [
+        other
+        for correction, _, points, other, _ in limits[1:]
+        if len(points) >= _TOLD and correction <= near
+    ][:_OTHERS]
     uncertainty = {
         n: max((abs(o[n] / v - 1.0) for o in beside if n in o), default=shares[n])
         for n, v in limit.items()

@@ -26,7 +26,7 @@ _PHASES = {
     "growth": ("march",),
 }
 _HEADINGS = ("setting", "size", "dofs", "seconds", *_PHASES, "MB")
-_WIDTH = 118  # characters of the table where the terminal is not at least as wide
+_WIDTH = 128  # characters of the table where the terminal is not at least as wide
 
 
 def write(result: Result, out: Path) -> list[Path]:
@@ -73,8 +73,8 @@ def _rows(result: Result, names: list[str]) -> list[tuple[bool, list[str]]]:
                     setting.title,
                     f"{setting.size:g}",
                     f"{record['dofs']:,}",
-                    f"{record['seconds']:.3f}",
-                    *(f"{t:.3f}" for t in phases),
+                    _seconds(record["seconds"]),
+                    *(_seconds(t) for t in phases),
                     f"{max(record['memory'].values(), default=0.0):.0f}",
                     *("" if e is None else percent(e) for e in errors),
                 ],
@@ -83,13 +83,18 @@ def _rows(result: Result, names: list[str]) -> list[tuple[bool, list[str]]]:
     return rows
 
 
+def _seconds(seconds: float) -> str:
+    """Three decimals for short times, two digits for long ones."""
+    return f"{seconds:.3f}" if seconds < 0.1 else f"{seconds:#.3g}".rstrip(".")
+
+
 def _table(result: Result) -> Table:
     names = list(result["reference"]["values"])
     table = Table(
         title=f"{result['title']}; * nothing faster is better", title_justify="left",
         box=box.SIMPLE_HEAD,
     )  # fmt: skip
-    table.add_column("")
+    table.add_column("", min_width=1)
     for i, heading in enumerate((*_HEADINGS, *names)):
         table.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
     for pareto, row in _rows(result, names):
@@ -103,7 +108,7 @@ def notes(result: Result) -> list[str]:
     lines = [f"Errors are counted from {known['source']}."]
     if not known["exact"]:
         sure = ", ".join(f"{n} {percent(u)}" for n, u in known["uncertainty"].items())
-        lines.append(f"How far the next best lines are from it: {sure}.")
+        lines.append(f"It is known to about: {sure}.")
     theory = result["theory"]
     if theory is not None and not theory["exact"]:
         off = ", ".join(f"{n} {100 * v:+.2f} %" for n, v in theory["relative_to_reference"].items())
@@ -147,3 +152,41 @@ def markdown(result: Result) -> str:
         f"PETSc {m['PETSc']}, {m['date']}."
     )
     return "\n".join(lines) + "\n"
+
+
+def summary(results: list[Result]) -> str:
+    """Several studies as one Markdown table, a row each, with what was measured on which machine.
+
+    Args:
+        results: What :func:`fxcrack.accuracy.run.run` returned.
+    """
+    lines = [
+        "| problem | errors from | 5 % | 1 % | 0.1 % |",
+        "|---|---|---|---|---|",
+    ]
+    for result in results:
+        known = result["reference"]
+        source = "exact closed form" if known["exact"] else "its finest runs"
+        sure = "" if known["exact"] else f", known to {percent(result['uncertainty'])}"
+        cells = [_cheapest(result, target) for target in result["targets"]]
+        lines.append(f"| {result['title']} | {source}{sure} | " + " | ".join(cells) + " |")
+    wall = sum(r["wall"] for r in results)
+    m = results[-1]["machine"]
+    lines += [
+        "",
+        f"Measured in {wall:.0f} s on {m['processor']}, {m['cores']} cores, one thread per rank, "
+        f"DOLFINx {m['dolfinx']}, PETSc {m['PETSc']}, {m['date']}.",
+        "",
+    ]
+    lines += [f"* {r['title']}: {r['advice']}" for r in results]
+    return "\n".join(lines) + "\n"
+
+
+def _cheapest(result: Result, target: Result) -> str:
+    """The cheapest setting for a target as a cell of a table."""
+    if target["record"] is None:
+        return "not reached"
+    record = result["records"][target["record"]]
+    setting = Setting(**record["setting"])
+    unit = f" {result['unit']}" if result["unit"] else ""
+    return f"{setting.title}, {setting.size:g}{unit}: {duration(record['seconds'])}"

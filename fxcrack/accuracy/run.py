@@ -17,7 +17,7 @@ import numpy as np
 
 import fxcrack
 from fxcrack.accuracy.family import settings
-from fxcrack.accuracy.fit import fit_power, plan, predict
+from fxcrack.accuracy.fit import FIT_POINTS, FIT_RANGE, fit_power, plan, predict
 from fxcrack.accuracy.launch import START_LIMIT, SettingFailed, TookTooLong, Workers
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.pareto import TARGETS, advice, cheapest, pareto_front
@@ -33,8 +33,6 @@ _PATIENCE = 4.0  # a setting may take so many times its predicted seconds,
 _START = 4.0  # seconds a new worker is thought to take
 _NEAR = 0.5  # seconds to the end of the budget that are not worth starting for
 _AT_LEAST = 10.0  # or so many seconds, but not more than the budget has left
-_FIT_POINTS = 4  # the largest problems of a line tell the exponents
-_FIT_RANGE = 1.5  # in log10 of the unknowns below the largest
 
 
 def run(
@@ -264,8 +262,8 @@ def _exponents(records: list[tuple[Setting, Result]]) -> dict[str, dict[str, Any
         if len(places) < 3:
             continue
         largest = max(records[i][1]["dofs"] for i in places)
-        used = [i for i in places if records[i][1]["dofs"] >= largest / 10**_FIT_RANGE]
-        used = used[-_FIT_POINTS:]
+        used = [i for i in places if records[i][1]["dofs"] >= largest / 10**FIT_RANGE]
+        used = used[-FIT_POINTS:]
         dofs = [records[i][1]["dofs"] for i in used]
         series = {"seconds": [records[i][1]["seconds"] for i in used]}
         for phase in records[places[-1]][1]["phases"]:
