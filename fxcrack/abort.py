@@ -1,21 +1,55 @@
 """An error on one rank ends the whole job.
 
-Left alone, an uncaught exception on one rank leaves the others waiting for it for ever.
+Left alone, an uncaught exception on one rank leaves the others waiting for it for ever. What the
+user asked for (:class:`~fxcrack.interrupt.Interrupted`, Ctrl-C) is one line and no traceback.
 """
 
 from __future__ import annotations
 
 import sys
+import time
 import traceback
 from types import TracebackType
 
 from mpi4py import MPI
+
+from fxcrack.interrupt import Interrupted
+
+PATIENCE = 3.0
+"""Seconds an interrupted rank waits for the others."""
+
+_ordinary = sys.excepthook
+
+
+def all_arrive(comm: MPI.Intracomm, patience: float) -> bool:
+    """Whether all ranks call this within so many seconds; collective if they do."""
+    deadline = time.monotonic() + patience
+    arrived = comm.Ibarrier()
+    while not arrived.Test():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(0.001)
+    return True
 
 
 def _abort(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Print the error and end all ranks."""
     comm = MPI.COMM_WORLD
     sys.stdout.flush()
+    if isinstance(error, Interrupted):
+        if comm.rank == 0:
+            sys.stderr.write(f"fxcrack: {error}\n")
+            sys.stderr.flush()
+        if comm.size > 1 and not all_arrive(comm, PATIENCE):
+            comm.Abort(error.code)
+        raise SystemExit(error.code)
+    if comm.size == 1:
+        _ordinary(kind, error, trace)
+        return
+    if kind is KeyboardInterrupt:
+        sys.stderr.write(f"rank {comm.rank} of {comm.size}: interrupted\n")
+        sys.stderr.flush()
+        comm.Abort(130)
     text = "".join(traceback.format_exception(kind, error, trace))
     sys.stderr.write(f"rank {comm.rank} of {comm.size}:\n{text}")
     sys.stderr.flush()
@@ -23,6 +57,5 @@ def _abort(kind: type[BaseException], error: BaseException, trace: TracebackType
 
 
 def install() -> None:
-    """End all ranks on an uncaught exception; does nothing on one rank."""
-    if MPI.COMM_WORLD.size > 1:
-        sys.excepthook = _abort
+    """End all ranks on an uncaught exception; on one rank only interruptions look different."""
+    sys.excepthook = _abort

@@ -92,18 +92,26 @@ class History:
         """Write all rows as comma-separated values; collective, rank 0 writes."""
         with together(self._comm, f"writing {path}"):
             if self._comm.rank == 0:
-                with replacing(path) as temporary, temporary.open("w", newline="") as stream:
-                    writer = csv.DictWriter(stream, self.columns)
-                    writer.writeheader()
-                    writer.writerows(self.rows)
+                self.write_csv(path)
 
     def to_json(self, path: str | Path) -> None:
         """Write rows, reason and details as JSON; collective, rank 0 writes."""
         with together(self._comm, f"writing {path}"):
             if self._comm.rank == 0:
-                content = {"reason": self.reason, "details": self.details, "rows": self.rows}
-                with replacing(path) as temporary:
-                    temporary.write_text(json.dumps(content, indent=1))
+                self.write_json(path)
+
+    def write_csv(self, path: str | Path) -> None:
+        """As :meth:`to_csv`, on one rank alone."""
+        with replacing(path) as temporary, temporary.open("w", newline="") as stream:
+            writer = csv.DictWriter(stream, self.columns)
+            writer.writeheader()
+            writer.writerows(self.rows)
+
+    def write_json(self, path: str | Path) -> None:
+        """As :meth:`to_json`, on one rank alone."""
+        content = {"reason": self.reason, "details": self.details, "rows": self.rows}
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=1))
 
     def plot(
         self,

@@ -149,6 +149,10 @@ class CondensedModel:
         self._rebase()
         self.rebases = 0
 
+    def take_over(self, bonds: list[SoftBond], finished: float) -> None:
+        """Go on with bonds that soften and energy spent by others; before the first window."""
+        self._soft, self._taken = bonds, finished
+
     def _rebase(self) -> None:
         self._assemble()
         coordinates = self._choose_window()

@@ -181,6 +181,18 @@ class LinearJumps:
         elif bonds:
             self.soft.refresh(self.cholesky)
 
+    def state_dict(self) -> dict[str, Array]:
+        """What a checkpoint keeps of every component, each of shape (n_window,).
+
+        Given loads, open and softening components, it decides the equilibrium.
+        """
+        return {"closed": self.closed.astype(float), "contact": self.contact.astype(float)}
+
+    def load_state_dict(self, states: dict[str, Array]) -> None:
+        """Take what :meth:`state_dict` gave; the same components are open or softening."""
+        self.contact[:] = states["contact"] > 0.0
+        self._set_closed(states["closed"] > 0.0)
+
     def hold(self, components: Ints) -> None:
         """Hold components again (contact)."""
         self.cholesky.remove(components)
