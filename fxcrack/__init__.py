@@ -21,6 +21,7 @@ from fxcrack.criteria import (
 from fxcrack.criteria import Ramp as OpeningRamp
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.interface.pairing import Interface
+from fxcrack.interrupt import Interrupted
 from fxcrack.loads import (
     Amplitude,
     BodyForce,
@@ -37,6 +38,7 @@ from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
 from fxcrack.nonlinear_materials import NeoHookean
 from fxcrack.output import plots
 from fxcrack.output.bonds import BondHistory, bond_table, write_releases
+from fxcrack.output.checkpoint import Checkpoint, checkpoints
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.history import History
 from fxcrack.output.report import tip_table, write_tip_table
@@ -60,6 +62,7 @@ __all__ = [
     "BodyForce",
     "BondHistory",
     "ByTemperature",
+    "Checkpoint",
     "CondensedOptions",
     "CrackLength",
     "CrackLengthVsTime",
@@ -75,6 +78,7 @@ __all__ = [
     "History",
     "InputError",
     "Interface",
+    "Interrupted",
     "Isotropic",
     "Mesh",
     "Monitor",
@@ -101,6 +105,7 @@ __all__ = [
     "Time",
     "Traction",
     "bond_table",
+    "checkpoints",
     "compat",
     "displacement_function",
     "mesh_from_gmsh",

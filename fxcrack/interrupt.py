@@ -66,7 +66,9 @@ class Listener:
         if self._before:
             self._ends = socket.socketpair()
             self._ends[1].setblocking(False)
-            self._fd_before = signal.set_wakeup_fd(self._ends[1].fileno(), warn_on_full_buffer=False)
+            self._fd_before = signal.set_wakeup_fd(
+                self._ends[1].fileno(), warn_on_full_buffer=False
+            )
             threading.Thread(target=self._watch, args=(self._ends[0],), daemon=True).start()
         return self
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from fxcrack.loads import Displacement, Load, Monitor
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
 from fxcrack.models import Model
+from fxcrack.output.checkpoint import Checkpoint
 from fxcrack.output.history import History, Row
 from fxcrack.output.progress import Progress
 from fxcrack.solve.condensed import CondensedModel, CondensedOptions
@@ -26,6 +28,7 @@ from fxcrack.solve.newton import NewtonOptions
 from fxcrack.steps.cycle_march import CycleMarch
 from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
 from fxcrack.steps.growth import Debond, Growth
+from fxcrack.steps.keeper import Keeper, keeper_of
 from fxcrack.steps.letting_go import Letting, given_forces
 from fxcrack.steps.march import March, Observer
 from fxcrack.steps.static import Static
@@ -120,6 +123,9 @@ class Scene:
         self.fatigue = FatigueState()
         self.history = History(mesh.comm)
         self._started = False
+        self.steps = 0
+        self.run_id = ""
+        self.kept: tuple[Checkpoint, Path, bool] | None = None
 
     def loads_at(self, time: float) -> Array:
         """Amplitudes of all supports and load factors at a time."""
@@ -139,6 +145,9 @@ class Scene:
         progress: bool = True,
         observers: Sequence[Observer] = (),
         accuracy: float | None = None,
+        save: str | Path | None = None,
+        checkpoint: Checkpoint | None = None,
+        restart: bool = False,
     ) -> History:
         """Run a step and return the history of all steps so far; collective.
 
@@ -151,10 +160,17 @@ class Scene:
             accuracy: Relative error that load and G may have for the mesh's and the increments'
                 sake. After the run it is estimated from a second solution to the first onset (see
                 :mod:`fxcrack.accuracy.estimate`), which is kept in ``history.details``.
+            save: File (.csv or .json) that holds the history while the step runs.
+            checkpoint: Where and how often the state is saved.
+            restart: Go on from the checkpoint if there is one; with the same scene and step, on
+                any number of ranks.
 
         Raises:
             AccuracyError: The accuracy is not reached, or cannot be judged; says what would reach
                 it. The history is kept.
+            InputError: The scene and the step do not go together, or the checkpoint belongs to
+                another scene.
+            Interrupted: Ctrl-C or SIGTERM came while ``save`` or ``checkpoint`` was given.
         """
         if accuracy is not None:
             check_accuracy(accuracy)
@@ -177,8 +193,13 @@ class Scene:
                     "bonded one, so nothing can debond",
                     g.title,
                 )
+        keeper = keeper_of(self, step, active, checkpoint, restart, save)
         self.model.prepare(active, self._reach(step))
-        if not self._started:
+        if keeper.resume is not None:
+            keeper.put_in_equilibrium()
+            self._take_books(keeper.resume)
+            self._started = True
+        elif not self._started:
             for pair, held in zip(self.pairs, self.model.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
             self.model.start()
@@ -189,7 +210,35 @@ class Scene:
         else:
             # another window: the same equilibrium in its components
             self.model.solve(given_forces(self.model, self.ramps, self.time, self._increment))
-        with Progress(self.mesh.comm, enabled=progress) as show:
+        self.history.reason = keeper.finished or self._go(
+            growths, step, keeper, progress=progress, observers=observers
+        )
+        self.history.details = {
+            "dofs": self.continuum.n_global,
+            "window": self.model.system.n_window,
+            "releases": sum(g.n_released for g in self.growths),
+            "factorizations": self.model.timings.factorizations,
+            "ranks": self.mesh.comm.size,
+            "contact_steps": self.model.system.contact_steps,
+            "seconds": dict(self.model.timings.seconds),
+        }
+        if self.fatigue.table["N"]:
+            self.history.details["tips"] = self.fatigue.table
+        if accuracy is not None:
+            self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
+        return self.history
+
+    def _go(
+        self,
+        growths: list[Growth],
+        step: Static | Cycles,
+        keeper: Keeper,
+        *,
+        progress: bool,
+        observers: Sequence[Observer],
+    ) -> str:
+        """March; returns why the step ended."""
+        with keeper, Progress(self.mesh.comm, enabled=progress) as show:
             every: list[Observer] = [show, *observers]
 
             def tell(event: str, row: Row) -> None:
@@ -207,24 +256,22 @@ class Scene:
                 ramps=self.ramps,
                 increment=self._increment,
                 observer=tell,
+                at_rest=keeper.at_rest if keeper.wanted else None,
+                resume=keeper.resume,
             )
-            self.history.reason = march.run()
-        self.time, self._work, self._released = march.time, march.work, march.released
-        self._snapped, self._increment = march.snapped, march.increment
-        self.history.details = {
-            "dofs": self.continuum.n_global,
-            "window": self.model.system.n_window,
-            "releases": sum(g.n_released for g in self.growths),
-            "factorizations": self.model.timings.factorizations,
-            "ranks": self.mesh.comm.size,
-            "contact_steps": self.model.system.contact_steps,
-            "seconds": dict(self.model.timings.seconds),
-        }
-        if self.fatigue.table["N"]:
-            self.history.details["tips"] = self.fatigue.table
-        if accuracy is not None:
-            self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
-        return self.history
+            try:
+                reason = march.run()
+            finally:
+                self._take_books(march.books())
+            self.history.reason = reason
+            keeper.finish(march, reason)
+            return reason
+
+    def _take_books(self, books: dict[str, Any]) -> None:
+        """Time and energies of a march."""
+        self.time, self._work, self._released = books["time"], books["work"], books["released"]
+        self._snapped, self._viscous = books["snapped"], books["viscous"]
+        self._increment = books["increment"]
 
     def _march(self, growths: list[Growth], step: Static | Cycles, **carried: Any) -> March:
         common = self.history, self.loads_at, self._breaks()

@@ -87,7 +87,8 @@ def write(comm: MPI.Comm, path: Path, saved: Saved) -> None:
         if comm.rank == 0:
             text = json.dumps({"version": VERSION, **saved.about}).encode()
             with replacing(path) as temporary, temporary.open("wb") as stream:
-                np.savez(stream, about=np.frombuffer(text, dtype=np.uint8), **saved.arrays)
+                arrays: dict[str, Any] = {"about": np.frombuffer(text, np.uint8), **saved.arrays}
+                np.savez(stream, **arrays)
                 stream.flush()
                 os.fsync(stream.fileno())
 
@@ -110,7 +111,7 @@ def read(comm: MPI.Comm, path: Path) -> Saved | None:
                     f"checkpoint {path} has version {about['version']} of the format, this "
                     f"program reads version {VERSION}; run without restart"
                 )
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as error:
+        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
             found = (
                 f"{path} is no checkpoint of fxcrack ({error}); give another file, or run without "
                 "restart"

@@ -150,8 +150,10 @@ class CondensedModel:
         self.rebases = 0
 
     def take_over(self, bonds: list[SoftBond], finished: float) -> None:
-        """Go on with bonds that soften and energy spent by others; before the first window."""
+        """Go on with bonds that soften and energy spent by others in the next window."""
         self._soft, self._taken = bonds, finished
+        if hasattr(self, "system"):
+            self.system.soft.bonds, self.system.soft.finished = bonds, finished
 
     def _rebase(self) -> None:
         self._assemble()

@@ -8,6 +8,7 @@ to zero; their balance with the strain energy is a check on all of it.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -56,6 +57,9 @@ class Account:
         ramps: Bonds that are letting go with time or over increments; goes on in place.
         increment: Number of increments so far.
         observer: Called with the event's name and the row after every event.
+        at_rest: Called between two increments or releases, where the step could go on from
+            :meth:`books` and the state of the scene.
+        resume: Books of an earlier run of the step to go on from.
     """
 
     def __init__(
@@ -75,6 +79,8 @@ class Account:
         ramps: list[Letting] | None = None,
         increment: int = 0,
         observer: Observer | None = None,
+        at_rest: Callable[[Account], None] | None = None,
+        resume: dict[str, Any] | None = None,
     ) -> None:
         self.model = model
         self.growths = growths
@@ -86,6 +92,8 @@ class Account:
         self.work = work
         self.released = released
         self._observer = observer
+        self._at_rest = at_rest
+        self._resume = resume
         self._names = self._column_names()
         self._end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=LARGE)
         self._values: list[TipValues] = []
@@ -94,6 +102,22 @@ class Account:
         self.viscous = viscous
         # all energy that left through bonds but the softening ones
         self._by_force = released - model.system.soft.taken(model.state.jump) - snapped
+
+    def books(self) -> dict[str, Any]:
+        """Energies and counters, plain values, with which the step can go on later."""
+        return {
+            "time": self.time,
+            "work": self.work,
+            "released": self.released,
+            "snapped": self.snapped,
+            "viscous": self.viscous,
+            "increment": self.increment,
+        }
+
+    def _rest(self) -> None:
+        """Say that nothing is half done."""
+        if self._at_rest is not None:
+            self._at_rest(self)
 
     def _force_at(self, time: float) -> Array:
         """Given forces of bonds that are letting go, shape (n_window,)."""

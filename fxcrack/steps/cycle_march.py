@@ -75,15 +75,26 @@ class CycleMarch(March):
         self.fatigue = fatigue
         self._limit = fatigue.N + step.n_max
         self._seen: list[TipCycle] = []
+        self._event = "cycle"
+        self._top = 0
         names = [load if moves else answer for load, answer, moves in self._names]
         self._corners = step.corners(loads_at, breaks, names)
 
+    def books(self) -> dict[str, Any]:
+        """Energies and counters, and where in the cycles."""
+        cycles = {"event": self._event, "top": self._top, "limit": self._limit}
+        return {**super().books(), **cycles}
+
     def _run_events(self) -> str:
-        self._go_to_maximum()
-        event = "cycle"
+        if self._resume is None:
+            self._go_to_maximum()
+        else:
+            self._event, self._limit = self._resume["event"], self._resume["limit"]
+            self._begin_at(self._resume["top"])
         while True:
+            self._rest()
             self._seen = self._stabilised_cycle()
-            self._record(event)
+            self._record(self._event)
             reason = self._ended()
             if reason:
                 return reason
@@ -93,7 +104,7 @@ class CycleMarch(March):
                 if jump.event == "limit":
                     return f"{self.cycles.n_max:g} cycles done"
                 return "arrest: no tip grows, however many cycles follow"
-            event = "unstable" if jump.event == "unstable" else "release"
+            self._event = "unstable" if jump.event == "unstable" else "release"
             self._let_go_after(jump)
 
     def _record(self, event: str) -> None:
@@ -115,11 +126,15 @@ class CycleMarch(March):
             for time, _ in corners:
                 self._load_to(time)
                 largest.append(max(self._largest()))
-            top = int(np.argmax(largest))
-            self._corners = corners[top:] + corners[:top]
+            self._begin_at(int(np.argmax(largest)))
         self._load_to(self._corners[0][0])
         for g, v in zip(self.growths, self._values, strict=True):
             self.fatigue.meet(g.p, v.tips.node, g.front.surface.n_nodes)
+
+    def _begin_at(self, top: int) -> None:
+        """Count the corners of the cycle from one of them."""
+        self._top = top
+        self._corners = self._corners[top:] + self._corners[:top]
 
     def _load_to(self, time: float) -> None:
         self._follow(self._pieces(time), time)

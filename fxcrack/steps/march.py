@@ -34,13 +34,33 @@ _NEVER = (
     "the criterion is not reached however large the load becomes; the step ends where that search "
     "began"
 )
+_BEYOND = 1e30
+"""A step without an end time that loads beyond this time would go on for ever."""
 
 
 class March(Account):
     """One quasi-static step on a condensed model: the three ways to step.
 
     Arguments as for :class:`~fxcrack.steps.account.Account`.
+
+    Attributes:
+        control: Size of the next increment.
+        done: Increments tried so far.
     """
+
+    def __init__(self, *parts: Any, **carried: Any) -> None:
+        super().__init__(*parts, **carried)
+        self.control = IncrementControl(self.step)
+        self.done = 0
+        if self._resume is not None:
+            self.control.size = self._resume["size"]
+            self.control.cutbacks = self._resume["cutbacks"]
+            self.done = self._resume["done"]
+
+    def books(self) -> dict[str, Any]:
+        """Energies and counters, those of increments included."""
+        control = {"size": self.control.size, "cutbacks": self.control.cutbacks}
+        return {**super().books(), **control, "done": self.done}
 
     # -- the three ways to step ----------------------------------------------------------
 
@@ -63,7 +83,8 @@ class March(Account):
         start = clock.perf_counter()
         before = {k: v for k, v in self.model.timings.seconds.items() if k.startswith("factor")}
         self._look()
-        self._record("start")
+        if self._resume is None:
+            self._record("start")
         try:
             if self.step.stepping == "increment":
                 reason = self._run_increments()
@@ -84,6 +105,7 @@ class March(Account):
 
     def _run_events(self) -> str:
         while True:
+            self._rest()
             reason = self._ended()
             if reason:
                 return reason
@@ -109,6 +131,7 @@ class March(Account):
                     "not have: it moves the load forth and back; use 'event' or 'increment'"
                 )
         while True:
+            self._rest()
             reason = self._ended()
             if reason:
                 return reason
@@ -120,18 +143,20 @@ class March(Account):
             self._let_go()
 
     def _run_increments(self) -> str:
-        control = IncrementControl(self.step)
-        done = 0
+        control = self.control
         while True:
+            self._rest()
             reason = self._ended()
             if reason:
                 return reason
-            done += 1
-            if done > self.step.max_increments:
+            self.done += 1
+            if self.done > self.step.max_increments:
                 return (
                     f"stopped: {self.step.max_increments} increments done without reaching the "
                     "end condition; raise max_increments or maximum, or end the step at a Time"
                 )
+            if self.time > _BEYOND and self._end_time >= LARGE:
+                return _NEVER
             control.size = max(control.size, min(self._scaled(), self.step.maximum))
             met = self._met_at_start()
             size = self.step.minimum if any(met) else control.size
@@ -230,7 +255,7 @@ class March(Account):
         if self.time > 0.0:
             begin = self._books()
         guess = self._next_guess()
-        while guess <= 1e30 or limit < LARGE:
+        while guess <= _BEYOND or limit < LARGE:
             if self._walk(min(guess, limit), upward=True) or self.time >= limit:
                 return True
             if begin is None or len(self.history) > rows:
@@ -287,11 +312,12 @@ class March(Account):
         begin = self.time
         values = self._values
         path = system.pieces(self.model.state, self.loads_at(target), self._force_at(target))
-        before = -1.0
+        snaps = system.soft.snaps
         for fraction, point in path:
             here = self.model.state
             times = (self.time, begin + fraction * (target - begin))
-            if fraction == before or times[0] == times[1]:
+            if system.soft.snaps > snaps:
+                snaps = system.soft.snaps
                 # an unstable state was passed: no equilibrium lies in between
                 self._advance(here, point, times[1])
                 self._values = self._evaluate()
@@ -299,7 +325,6 @@ class March(Account):
                 if upward and max(self._largest()) >= 1.0:
                     return True
                 continue
-            before = fraction
             hit = self._hit(values, here, point, times, upward=upward)
             if hit is None:
                 self._advance(here, point, times[1])

@@ -1,0 +1,130 @@
+"""The state of a scene between two increments or releases, as plain values and arrays.
+
+Everything the rest of the history depends on: interfaces (:mod:`fxcrack.solve.state`), bonds that
+let go with time, records of releases, fatigue, energies, counters, and the history itself. All of
+it is the same on every rank.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.criteria import AmplitudeRelease, Ramp
+from fxcrack.errors import InputError
+from fxcrack.output.checkpoint import Arrays, Saved
+from fxcrack.solve.state import give_bonds, give_equilibrium, take_states
+from fxcrack.steps.letting_go import Letting, TimedRelease, ViscousRelease, given_forces
+from fxcrack.steps.records import ReleaseRecord
+
+if TYPE_CHECKING:
+    from fxcrack.scene import Scene
+    from fxcrack.steps.growth import Growth
+
+_SAME = 1e-9
+"""Loads are numbers of the input: they differ by round-off or by far more."""
+_FLOATS = ("DBT", "EFENRRTR", "ENRRT", "OPENBC", "CRSTS")
+
+
+def take(scene: Scene, books: dict[str, Any]) -> Saved:
+    """State of a scene; collective.
+
+    Args:
+        scene: The scene.
+        books: Counters and energies of the step at rest.
+    """
+    fatigue = scene.fatigue
+    arrays = take_states(scene.model)
+    for g in scene.growths:
+        arrays |= _take_records(g)
+    for i, ramp in enumerate(scene.ramps):
+        arrays[f"ramp.nodes[{i}]"] = ramp.nodes
+        arrays[f"ramp.force[{i}]"] = ramp.force
+    for p in fatigue.waiting:
+        arrays[f"fatigue.waiting[{p}]"] = fatigue.waiting[p]
+        arrays[f"fatigue.credit[{p}]"] = fatigue.credit[p]
+    about = {
+        "books": books,
+        "ramps": [_ramp(r) for r in scene.ramps],
+        "fatigue": {"N": fatigue.N, "pairs": list(fatigue.waiting), "table": fatigue.table},
+        "rows": scene.history.rows,
+    }
+    return Saved(about, arrays)
+
+
+def give_before_window(scene: Scene, saved: Saved) -> None:
+    """Put a new scene into a saved state, up to what needs its window."""
+    about, arrays = saved.about, saved.arrays
+    scene.history.rows[:] = about["rows"]
+    scene.ramps[:] = [_ramp_of(scene, i, r, arrays) for i, r in enumerate(about["ramps"])]
+    scene.model.keep = [(r.p, int(k)) for r in scene.ramps for k in r.nodes]
+    give_bonds(scene.model, arrays)
+    for g in scene.growths:
+        _give_records(g, arrays)
+    fatigue, known = scene.fatigue, about["fatigue"]
+    fatigue.N = known["N"]
+    fatigue.table = known["table"]
+    for p in known["pairs"]:
+        fatigue.waiting[p] = np.asarray(arrays[f"fatigue.waiting[{p}]"], dtype=bool)
+        fatigue.credit[p] = np.asarray(arrays[f"fatigue.credit[{p}]"], dtype=float)
+
+
+def give_after_window(scene: Scene, saved: Saved) -> None:
+    """Put a scene whose window is made into the saved equilibrium.
+
+    Raises:
+        InputError: Loads or jumps are not those that were saved.
+    """
+    books = saved.about["books"]
+    before, now = saved.arrays["loads"].astype(float), scene.loads_at(books["time"])
+    if not np.allclose(before, now, rtol=_SAME, atol=_SAME * np.abs(before).max(initial=0.0)):
+        raise InputError(
+            f"the checkpoint does not fit: at time {books['time']:g} amplitudes and load factors "
+            f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or mend the "
+            "scene"
+        )
+    force = given_forces(scene.model, scene.ramps, books["time"], books["increment"])
+    give_equilibrium(scene.model, saved.arrays, force)
+
+
+def _take_records(growth: Growth) -> Arrays:
+    records, p = growth.records, growth.p
+    out: Arrays = {f"record.node[{p}]": np.array([r.node for r in records], dtype=np.int64)}
+    for name in _FLOATS:
+        out[f"record.{name}[{p}]"] = np.array([getattr(r, name) for r in records], dtype=float)
+    return out
+
+
+def _give_records(growth: Growth, arrays: Arrays) -> None:
+    columns = [arrays[f"record.{name}[{growth.p}]"].tolist() for name in ("node", *_FLOATS)]
+    growth.records = [
+        ReleaseRecord(node, at, f, tuple(rates), tuple(opening), tuple(stress))
+        for node, at, f, rates, opening, stress in zip(*columns, strict=True)
+    ]
+    growth.n_released = len(growth.records)
+
+
+def _ramp(ramp: Letting) -> dict[str, Any]:
+    if isinstance(ramp, ViscousRelease):
+        return {
+            "p": ramp.p,
+            "viscosity": ramp.viscosity,
+            "time": ramp.time,
+            "remaining": ramp.remaining,
+        }
+    return {"p": ramp.p, "start": ramp.start}
+
+
+def _ramp_of(scene: Scene, i: int, known: dict[str, Any], arrays: Arrays) -> Letting:
+    p = known["p"]
+    nodes: npt.NDArray[np.int64] = np.asarray(arrays[f"ramp.nodes[{i}]"], dtype=np.int64)
+    force: npt.NDArray[np.float64] = np.asarray(arrays[f"ramp.force[{i}]"], dtype=float)
+    if "viscosity" in known:
+        return ViscousRelease(
+            p, nodes, force, known["viscosity"], known["time"], known["remaining"]
+        )
+    law = scene.growths[p].debond.release
+    assert isinstance(law, AmplitudeRelease | Ramp)
+    return TimedRelease(p, nodes, force, law, known["start"])
