@@ -188,13 +188,11 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         ],
     ),
     "3-D": (
-        lambda comm: solid(comm, criterion=fx.VCCT(GIc=0.2)),
+        lambda comm: solid(comm, criterion=fx.VCCT(GIc=0.2, method="closure")),
         [fx.Static(until=fx.Releases(15))],
     ),
-    "3-D, closure, progressive": (
-        lambda comm: solid(
-            comm, criterion=fx.VCCT(GIc=0.2, method="closure"), release=fx.Progressive()
-        ),
+    "3-D, progressive": (
+        lambda comm: solid(comm, criterion=fx.VCCT(GIc=0.2), release=fx.Progressive()),
         [fx.Static(until=fx.Releases(12))],
     ),
 }
