@@ -262,7 +262,7 @@ class Scene:
             try:
                 reason = march.run()
             finally:
-                self._take_books(march.books())
+                self._take_books(march.carried())
             self.history.reason = reason
             keeper.finish(march, reason)
             return reason

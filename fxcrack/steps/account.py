@@ -58,7 +58,7 @@ class Account:
         increment: Number of increments so far.
         observer: Called with the event's name and the row after every event.
         at_rest: Called between two increments or releases, where the step could go on from
-            :meth:`books` and the state of the scene.
+            :meth:`carried` and the state of the scene.
         resume: Books of an earlier run of the step to go on from.
     """
 
@@ -103,7 +103,7 @@ class Account:
         # all energy that left through bonds but the softening ones
         self._by_force = released - model.system.soft.taken(model.state.jump) - snapped
 
-    def books(self) -> dict[str, Any]:
+    def carried(self) -> dict[str, Any]:
         """Energies and counters, plain values, with which the step can go on later."""
         return {
             "time": self.time,

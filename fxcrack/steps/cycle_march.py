@@ -80,10 +80,10 @@ class CycleMarch(March):
         names = [load if moves else answer for load, answer, moves in self._names]
         self._corners = step.corners(loads_at, breaks, names)
 
-    def books(self) -> dict[str, Any]:
+    def carried(self) -> dict[str, Any]:
         """Energies and counters, and where in the cycles."""
         cycles = {"event": self._event, "top": self._top, "limit": self._limit}
-        return {**super().books(), **cycles}
+        return {**super().carried(), **cycles}
 
     def _run_events(self) -> str:
         if self._resume is None:

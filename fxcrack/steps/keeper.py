@@ -169,7 +169,7 @@ class Keeper:
     def _save(self, march: Account, reason: str) -> None:
         scene = self._scene
         assert self._checkpoint is not None
-        saved = take(scene, march.books())
+        saved = take(scene, march.carried())
         version = importlib.metadata.version("fxcrack")
         about = {"fxcrack": version, "run": scene.run_id, "finished": reason, "scene": self._print}
         saved.about = {**about, **saved.about}

@@ -57,10 +57,10 @@ class March(Account):
             self.control.cutbacks = self._resume["cutbacks"]
             self.done = self._resume["done"]
 
-    def books(self) -> dict[str, Any]:
+    def carried(self) -> dict[str, Any]:
         """Energies and counters, those of increments included."""
         control = {"size": self.control.size, "cutbacks": self.control.cutbacks}
-        return {**super().books(), **control, "done": self.done}
+        return {**super().carried(), **control, "done": self.done}
 
     # -- the three ways to step ----------------------------------------------------------
 
@@ -156,7 +156,7 @@ class March(Account):
                     "end condition; raise max_increments or maximum, or end the step at a Time"
                 )
             if self.time > _BEYOND and self._end_time >= LARGE:
-                return _NEVER
+                return "the criterion is not reached however large the load becomes"
             control.size = max(control.size, min(self._scaled(), self.step.maximum))
             met = self._met_at_start()
             size = self.step.minimum if any(met) else control.size

@@ -7,6 +7,7 @@ it is the same on every rank.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 
 _SAME = 1e-9
 """Loads are numbers of the input: they differ by round-off or by far more."""
-_FLOATS = ("DBT", "EFENRRTR", "ENRRT", "OPENBC", "CRSTS")
 
 
 def take(scene: Scene, books: dict[str, Any]) -> Saved:
@@ -90,20 +90,25 @@ def give_after_window(scene: Scene, saved: Saved) -> None:
 
 
 def _take_records(growth: Growth) -> Arrays:
-    records, p = growth.records, growth.p
-    out: Arrays = {f"record.node[{p}]": np.array([r.node for r in records], dtype=np.int64)}
-    for name in _FLOATS:
-        out[f"record.{name}[{p}]"] = np.array([getattr(r, name) for r in records], dtype=float)
-    return out
+    """One array per field of the records, first axis the releases."""
+    return {
+        f"record.{f.name}[{growth.p}]": np.array([getattr(r, f.name) for r in growth.records])
+        for f in fields(ReleaseRecord)
+    }
 
 
 def _give_records(growth: Growth, arrays: Arrays) -> None:
-    columns = [arrays[f"record.{name}[{growth.p}]"].tolist() for name in ("node", *_FLOATS)]
-    growth.records = [
-        ReleaseRecord(node, at, f, tuple(rates), tuple(opening), tuple(stress))
-        for node, at, f, rates, opening, stress in zip(*columns, strict=True)
-    ]
+    names = [f.name for f in fields(ReleaseRecord)]
+    columns = [arrays[f"record.{name}[{growth.p}]"].tolist() for name in names]
+    growth.records = [ReleaseRecord(*map(_field, row)) for row in zip(*columns, strict=True)]
     growth.n_released = len(growth.records)
+
+
+def _field(value: Any) -> Any:
+    """A number, three of them as a tuple, or a matrix."""
+    if not isinstance(value, list):
+        return value
+    return np.array(value) if isinstance(value[0], list) else tuple(value)
 
 
 def _ramp(ramp: Letting) -> dict[str, Any]:
