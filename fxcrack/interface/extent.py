@@ -25,7 +25,7 @@ class CrackExtent:
 
     def __init__(self, front: Front) -> None:
         self._front = front
-        surface = front.surface
+        self._surface = surface = front.surface  # lengths are those of the undeformed surface
         self._line = surface.dim == 1
         tips = front.tips()
         self._front_length = float(tips.width.sum()) if len(tips) else 0.0
@@ -35,7 +35,7 @@ class CrackExtent:
 
     def area(self, tips: Tips) -> float:
         """Open area (length times thickness or ring in 2-D), length^2."""
-        surface, bonded = self._front.surface, self._front.bonded
+        surface, bonded = self._surface, self._front.bonded
         total = float(surface.areas[~bonded].sum())
         # the front stands half-way into the facets it cuts; with second-order shape functions
         # a corner node stands for a sixth of each facet

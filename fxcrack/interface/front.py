@@ -167,6 +167,15 @@ class Front:
         distance = np.linalg.norm(s.x[:, None] - centre[None], axis=2)
         return np.asarray(direction[np.argmin(distance, axis=1)])
 
+    def follow(self, x: Array) -> None:
+        """Take the slave nodes at other positions: the current configuration.
+
+        Args:
+            x: Shape (n_nodes, 3), length.
+        """
+        self.surface = self.surface.moved(x)
+        self._cache.clear()
+
     def release(self, nodes: Ints) -> None:
         """Open nodes and forget the geometry around them."""
         self.bonded[nodes] = False

@@ -5,11 +5,14 @@ delta = R^t (u_s - sum_m W_sm u_m)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.continuum import Continuum
 from fxcrack.interface.pairing import Pair
+from fxcrack.interface.surface import FacetSurface
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -54,10 +57,13 @@ class JumpReader:
     Args:
         continuum: Displacement space.
         pairs: Interfaces.
+        masters: Master surfaces whose nodes are wanted as well.
     """
 
-    def __init__(self, continuum: Continuum, pairs: list[Pair]) -> None:
-        nodes = [p.surface.dofs for p in pairs]
+    def __init__(
+        self, continuum: Continuum, pairs: list[Pair], masters: Sequence[FacetSurface] = ()
+    ) -> None:
+        nodes = [p.surface.dofs for p in pairs] + [m.dofs for m in masters]
         nodes += [p.masters.ravel() for p in pairs]
         self.values = NodeValues(
             continuum, np.concatenate(nodes) if nodes else np.zeros(0, dtype=np.int64)

@@ -6,7 +6,7 @@ and that of the facets follow the input order of the cells and not the partition
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import basix
@@ -60,6 +60,8 @@ class FacetSurface:
         facets: Node numbers per facet in basix order, shape (n_facets, nodes_per_facet).
         inner: A point inside the cell behind each facet, shape (n_facets, 3).
         breadth: Out-of-plane extent at the nodes (1 in 3-D), shape (n_nodes,).
+        outward: Sign that turns each facet's own area vector outward, shape (n_facets,); found
+            from ``inner`` where it is not given.
     """
 
     name: str
@@ -70,6 +72,7 @@ class FacetSurface:
     facets: Ints
     inner: Array
     breadth: Array
+    outward: Array | None = None
 
     @property
     def n_nodes(self) -> int:
@@ -101,10 +104,26 @@ class FacetSurface:
             area = np.cross(tangents[0], [0.0, 0.0, 1.0])
         else:
             area = np.cross(tangents[0], tangents[1])
-        outward = self.x[self.facets[:, : self.n_corners]].mean(axis=1) - self.inner
-        area *= np.where(np.einsum("fmc,fc->fm", area, outward) < 0.0, -1.0, 1.0)[..., None]
+        if self.outward is None:
+            away = self.x[self.facets[:, : self.n_corners]].mean(axis=1) - self.inner
+            area *= np.where(np.einsum("fmc,fc->fm", area, away) < 0.0, -1.0, 1.0)[..., None]
+        else:
+            area *= self.outward[:, None, None]
         size = np.linalg.norm(area, axis=-1)
         return area / np.where(size > 0.0, size, 1.0)[..., None], size
+
+    def moved(self, x: Array) -> FacetSurface:
+        """The same facets with their nodes at other positions, sides kept.
+
+        Args:
+            x: Shape (n_nodes, 3), length.
+        """
+        if self.outward is not None:
+            return replace(self, x=x)
+        centre = np.asarray(facet_element(self.kind, self.order).points).mean(axis=0)[None]
+        unit, _ = self.facet_normals(centre)
+        own, _ = replace(self, outward=np.ones(len(self.facets))).facet_normals(centre)
+        return replace(self, x=x, outward=np.sign(np.einsum("fc,fc->f", unit[:, 0], own[:, 0])))
 
     @cached_property
     def normals(self) -> Array:

@@ -23,7 +23,9 @@ from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.interface.jumps import JumpCoordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.replica import JumpReader
+from fxcrack.interface.sliding import renewed
 from fxcrack.interface.supports import Supports
+from fxcrack.interface.surface import gather_surface
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve import newton
 from fxcrack.solve.condensation import Condensation, border_vectors
@@ -114,7 +116,15 @@ class NewtonModel(CondensedModel):
         self._stiff = 0.0
         self._base = np.zeros(0)
         self._moved = False  # whether the tangent is that of a trial
-        self._reader = JumpReader(continuum, pairs)
+        self._current = bodies.finite
+        self._masters = [
+            gather_surface(continuum, p.interface.master)
+            if self._current and p.interface.contact
+            else None
+            for p in pairs
+        ]
+        self._undeformed = [p.surface.x for p in pairs]
+        self._reader = JumpReader(continuum, pairs, [m for m in self._masters if m is not None])
         self._trial: PETSc.Vec | None = None
         self.last_move: Move | None = None
 
@@ -203,6 +213,44 @@ class NewtonModel(CondensedModel):
             inside = index >= 0
             out[index[inside]] = self._reader.jumps(values, pair, frames)[inside]
         return out
+
+    def _follow_fronts(self, u: PETSc.Vec) -> None:
+        """Take normals and lengths at the fronts from a displacement, if it is finite."""
+        if not self._current:
+            return
+        values = self._reader.values.gather(u.array_r)
+        for pair, front, x in zip(self.pairs, self.fronts, self._undeformed, strict=True):
+            moved = x.copy()
+            moved[:, : self.continuum.gdim] += self._reader.slaves(values, pair)
+            front.follow(moved)
+
+    def renew_pairs(self) -> bool:
+        """Pair open nodes with the master surface where it is now; collective.
+
+        Returns:
+            Whether a pair has changed; the dense system is then another one, and the caller
+            solves for its state (:meth:`solve`).
+        """
+        if not any(m is not None for m in self._masters):
+            return False
+        values = self._reader.values.gather(self.u.array_r)
+        changed = False
+        for p, master in enumerate(self._masters):
+            if master is None:
+                continue
+            pair = self.pairs[p]
+            new = renewed(
+                pair,
+                self.fronts[p].bonded,
+                master,
+                self._reader.slaves(values, pair),
+                values[self._reader.values.find(master.dofs)],
+            )
+            if new is not None:
+                self.pairs[p], changed = new, True
+        if changed:
+            self.rebase()
+        return changed
 
     # -- what SNES asks ------------------------------------------------------------------
 
@@ -363,6 +411,7 @@ class NewtonModel(CondensedModel):
         if self._trial is not None:
             self._trial.destroy()
         self._trial = trial
+        self._follow_fronts(trial)
         return Equilibrium(loads, last.force, last.jump, conjugate)
 
     def accept(self) -> None:
@@ -473,6 +522,7 @@ class NewtonModel(CondensedModel):
     def _back(self) -> None:
         """Dense system and bodies at the accepted state again."""
         self.bodies.set(self.u)
+        self._follow_fronts(self.u)
         if self._moved or self._condensation is None:
             self._factor()  # the next prediction and the energies need the tangent of this state
             self._moved = False

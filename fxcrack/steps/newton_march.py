@@ -42,6 +42,7 @@ class NewtonMarch(March):
         size = self.step.maximum
         beyond: tuple[float, float] | None = None
         while True:
+            self._renew()
             begin = self.time
             way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
             guess = self._predicted(begin + way, upward=upward)
@@ -107,10 +108,19 @@ class NewtonMarch(March):
         return float(min(max(guess, low + margin), high - margin))
 
     def _evaluate_at(self, state: Equilibrium, time: float) -> list[TipValues]:
-        return [
-            g.evaluate(v.tips, state, time) for g, v in zip(self.growths, self._values, strict=True)
-        ]
+        # tips anew: normals and lengths at the front follow the bodies
+        return [g.evaluate(g.tips(), state, time) for g in self.growths]
+
+    def _evaluate(self) -> list[TipValues]:
+        return self._evaluate_at(self.model.state, self.time)
+
+    def _renew(self) -> None:
+        """Renew the pairing of faces that have slid, where the bodies move far."""
+        if self.model.renew_pairs():
+            self.model.solve(self._force_at(self.time))
+            self._values = self._evaluate()
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
+        self._renew()
         loads, force = self.loads_at(target), self._force_at(target)
         return [(1.0, self.model.move(loads, force, target, target - self.time))]

@@ -28,6 +28,7 @@ class Term:
         constant: Whether its tangent does not depend on u (a linear term).
         version: Counts the changes of a constant tangent by :meth:`begin` (another dt or
             temperature): the same number, the same tangent.
+        finite: Whether bodies may turn and stretch by any amount.
         energy_name: What the balance calls its stored energy; terms of one name are summed.
     """
 
@@ -36,6 +37,7 @@ class Term:
     constant: bool = False
     version: int = 0
     energy_name: str = "strain_energy"
+    finite: bool = False
 
     def energy(self, u: fem.Function) -> Any:
         """Stored energy as a UFL form, ``None`` if it stores none."""

@@ -61,6 +61,11 @@ class Bodies:
         return all(t.symmetric for t in self.terms)
 
     @property
+    def finite(self) -> bool:
+        """Whether bodies may turn and stretch by any amount."""
+        return any(t.finite for t in self.terms)
+
+    @property
     def constant(self) -> bool:
         """Whether the tangent does not depend on u."""
         return all(t.constant for t in self.terms)

@@ -27,14 +27,14 @@ class Elastic(StoringTerm):
 
     def __init__(self, continuum: Continuum, *, finite: bool = False) -> None:
         super().__init__(continuum, "elastic")
-        self._finite = finite
+        self.finite = finite
         self.name = "finite strain" if finite else "elasticity"
         self.constant = not finite
 
     def energy(self, u: fem.Function) -> Any:
         """Strain energy."""
         c = self._continuum
-        strain = green_lagrange(c.model, u, c.x) if self._finite else c.model.strain(u, c.x)
+        strain = green_lagrange(c.model, u, c.x) if self.finite else c.model.strain(u, c.x)
         total = 0
         for i in self._parts:
             stiffness, _, dx = c.parts[i]
@@ -45,7 +45,7 @@ class Elastic(StoringTerm):
                 rise = c.temperature.rise
                 stiffness = thermal.whole_stiffness(c, i)
                 e = thermal.whole(c.model, strain) - rise * thermal.expansion(c, i)
-                if self._finite:
+                if self.finite:
                     e -= rise**2 / 2 * thermal.square_expansion(c, i)
             total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
         return total

@@ -1,0 +1,72 @@
+"""Pairing in the current configuration: open slave nodes meet the master surface where it is now.
+
+    n . (x_s - sum_m W_m x_m) >= 0,    x = X + u,    W and n those of the projection of x_s
+
+In the unknowns of the jump coordinates this is delta_n + g >= 0 with g = n . (X_s - sum W_m X_m).
+Bonded nodes keep the master point they are bonded to.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.interface.pairing import Pair, local_frames
+from fxcrack.interface.projection import project
+from fxcrack.interface.surface import FacetSurface
+
+Array = npt.NDArray[np.float64]
+Bools = npt.NDArray[np.bool_]
+
+_SLIDE = 0.01
+"""Part of a facet a node may slide, and angle its normal may turn, before it is paired anew."""
+_NEAR = 0.5
+"""Parts of a facet within which a gap may close in the next increment."""
+
+
+def renewed(
+    pair: Pair, bonded: Bools, master: FacetSurface, u_slave: Array, u_master: Array
+) -> Pair | None:
+    """A pair with its open nodes projected on the present master surface.
+
+    Args:
+        pair: The pair as it is.
+        bonded: Slave nodes that are bonded now, shape (n_nodes,).
+        master: Undeformed master surface.
+        u_slave: Displacements of the slave nodes, shape (n_nodes, gdim).
+        u_master: Displacements of the master nodes, shape (master.n_nodes, gdim).
+
+    Returns:
+        ``None`` if no gap that may close has changed enough to matter.
+    """
+    gdim = u_slave.shape[1]
+    x, y = pair.surface.x.copy(), master.x.copy()
+    x[:, :gdim] += u_slave
+    y[:, :gdim] += u_master
+    slave, now = pair.surface.moved(x), master.moved(y)
+    foot = project(x, now)
+    normals = -slave.normals
+    away = x - foot.foot
+    gap = np.einsum("nc,nc->n", away, normals)
+    aside = np.linalg.norm(away - gap[:, None] * normals, axis=1)
+    size = now.facet_size
+    over = ~bonded & (aside <= 0.1 * size + 0.1 * np.abs(gap))
+    masters = now.dofs[now.facets[foot.facet]]
+    near = over & (gap < _NEAR * size)
+    slid = (masters != pair.masters).any(axis=1)
+    slid |= np.abs(foot.weights - pair.weights).max(axis=1) > _SLIDE
+    slid |= np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _SLIDE
+    if not np.any(near & (slid | ~pair.paired)):
+        return None
+    frames, weights, gaps = pair.frames.copy(), pair.weights.copy(), pair.gap.copy()
+    new_masters = pair.masters.copy()
+    frames[over] = local_frames(normals, gdim)[over]
+    weights[over], new_masters[over] = foot.weights[over], masters[over]
+    at_rest = np.einsum("nk,nkc->nc", foot.weights, master.x[master.facets[foot.facet]])
+    gaps[over] = np.einsum("nc,nc->n", pair.surface.x - at_rest, normals)[over]
+    paired = np.where(bonded, pair.paired, over)
+    return replace(
+        pair, paired=paired, masters=new_masters, weights=weights, frames=frames, gap=gaps
+    )

@@ -1,0 +1,113 @@
+"""Finite strain with interfaces: frames that turn with the body, contact that slides far."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from specimens import STEEL, onsets, specimen
+
+import fxcrack as fx
+from fxcrack.effects import FiniteStrain
+from fxcrack.interface.surface import FacetSurface
+from fxcrack.meshes.blocks import Blocks, build
+from fxcrack.meshes.bodies import two_bodies
+from fxcrack.meshes.dcb import dcb_2d
+
+CLOCK = np.linspace(0.0, 1.0, 41)  # of a turn; a pin moves along a chord in between
+
+
+def pinned(name: str, x: float, y: float, angle: float, opening: float) -> list[fx.Displacement]:
+    """A pin that turns about the origin until time 1 and opens along the turned y afterwards."""
+    turn = angle * CLOCK
+    u = (np.cos(turn) - 1.0) * x - np.sin(turn) * y
+    v = np.sin(turn) * x + (np.cos(turn) - 1.0) * y
+    times = (*CLOCK, 2.0)
+    along = (*u, u[-1] - opening * np.sin(angle))
+    across = (*v, v[-1] + opening * np.cos(angle))
+    return [
+        fx.Displacement(name, x=1.0, amplitude=fx.Amplitude(times, along), name=f"{name}_x"),
+        fx.Displacement(name, y=1.0, amplitude=fx.Amplitude(times, across), name=f"{name}_y"),
+    ]
+
+
+def test_a_turned_specimen_cracks_like_one_at_rest() -> None:
+    def run(angle: float) -> fx.History:
+        scene = specimen(
+            dcb_2d(dx=2.0, ny=2),
+            criterion=fx.VCCT(GIc=2.0),
+            supports=[
+                *pinned("pin_top", 0.0, 1.5, angle, 5.0),
+                *pinned("pin_bottom", 0.0, -1.5, angle, -5.0),
+            ],
+            effects=[FiniteStrain()],
+        )
+        return scene.run(fx.Static(until=fx.Releases(3)))
+
+    at_rest, turned = run(0.0), run(np.radians(80.0))
+    assert len(onsets(at_rest)) == 3
+    for one, other in zip(onsets(at_rest), onsets(turned), strict=True):
+        # f = 1 is met to 1e-9 and the iteration to 1e-10 of the forces
+        assert other["time"] == pytest.approx(one["time"], rel=1e-7)
+        assert other["GI[bond]"] == pytest.approx(one["GI[bond]"], rel=1e-7)
+        assert other["GII[bond]"] == pytest.approx(one["GII[bond]"], abs=1e-7 * one["GI[bond]"])
+
+
+def test_surfaces_keep_their_sides_when_they_turn(comm: MPI.Intracomm) -> None:
+    scene = specimen(dcb_2d(comm, dx=10.0, ny=1))
+    surface: FacetSurface = scene.pairs[0].surface
+    turned = surface.moved(np.column_stack([-surface.x[:, 0], -surface.x[:, 1], surface.x[:, 2]]))
+    assert turned.normals == pytest.approx(-surface.normals, abs=1e-14)
+    back = turned.moved(surface.x)
+    assert back.normals == pytest.approx(surface.normals, abs=1e-14)
+
+
+def slider() -> Blocks:
+    """A block on a beam of length 8 that rests on its two lower corners."""
+    model, _, lower = two_bodies(
+        (np.linspace(1.0, 3.0, 5), np.linspace(0.0, 8.0, 12)),
+        (np.linspace(0.0, 1.0, 3), np.linspace(-1.0, 0.0, 3)),
+        cell="quadrilateral",
+        order=1,
+    )
+    model.group("left", lower.part(x=0.0, y=-1.0))
+    model.group("right", lower.part(x=8.0, y=-1.0))
+    return model
+
+
+@pytest.mark.mpi
+def test_a_block_slides_over_many_facets(comm: MPI.Intracomm) -> None:
+    # pressed down with a weight of 10 and moved by 4 of the beam's facets, without friction
+    path = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 0.0, 1.0))
+    press = fx.Amplitude((0.0, 1.0), (0.0, 1.0))
+    interface = fx.Interface(
+        slave="upper_face", master="lower_face", bonded=lambda x: x[0] < -1.0, contact=True
+    )
+    scene = fx.Scene(
+        build(comm, "slider", slider),
+        materials=STEEL,
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("left", x=0.0, y=0.0),
+            fx.Displacement("right", y=0.0),
+            fx.Displacement("top", x=2.9, amplitude=path, name="slide"),
+        ],
+        loads=[fx.Traction("top", (0.0, -5.0), amplitude=press)],
+        bonds=[interface],
+        effects=[FiniteStrain()],
+    )
+    history = scene.run(
+        fx.Static(until=fx.Time(2.0), stepping="increment", initial=0.1, maximum=0.1)
+    )
+    assert history.reason == "time 2 reached"
+    moved = np.maximum(history["time"] - 1.0, 0.0) * 2.9
+    loaded = history["time"] >= 1.0 - 1e-9
+    left, right = history["R[left.y]"][loaded], history["R[right.y]"][loaded]
+    # statics of the whole; the iteration ends at 1e-10 of the forces
+    assert left + right == pytest.approx(np.full(len(left), 10.0), rel=1e-6)
+    # the weight stands at 2 + what it had moved when the increment began: that is when faces are
+    # paired; facets of 0.73 carry it by their shape functions
+    stood = 2.0 + np.concatenate([[0.0], moved[loaded][:-1]])
+    assert 8.0 * right / 10.0 == pytest.approx(stood, abs=0.06)
+    # nothing holds the block back but the slope of the bent beam
+    assert np.abs(history["R[slide.x]"][loaded]).max() < 0.05
