@@ -1,12 +1,13 @@
 """The interface alone: dense equilibrium of the window on S, with unilateral contact.
 
 Contact holds normal components at -gap while they press (p_n >= 0) and frees them while they gape
-(delta_n >= -gap).
+(delta_n >= -gap). With friction, :mod:`fxcrack.solve.friction` finds and follows the states.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -14,9 +15,19 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import nnls
 
 from fxcrack.errors import ConvergenceError
-from fxcrack.solve.linear_jumps import Equilibrium, LinearJumps, blend, bond_work, work_between
+from fxcrack.solve.friction import Committed, Friction
+from fxcrack.solve.linear_jumps import (
+    Equilibrium,
+    LinearJumps,
+    Snapshot,
+    blend,
+    bond_work,
+    work_between,
+)
+from fxcrack.solve.softening import SoftBond
 
 Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
 
 _ROUND_OFF = 1e-11
@@ -27,7 +38,70 @@ class JumpSystem(LinearJumps):
     """States of the window components, contact followed along loads.
 
     Arguments as for :class:`~fxcrack.solve.linear_jumps.LinearJumps`.
+
+    Attributes:
+        friction: The contact nodes if some of them have friction; none of their components is in
+            the Cholesky factor then, though they count as free.
     """
+
+    friction: Friction | None = None
+
+    # -- with friction -------------------------------------------------------------------
+
+    def rub(self, friction: Friction) -> None:
+        """Take contact nodes with friction, or note that there are more of them."""
+        self.friction = friction
+        self.free[friction.rows] = True
+        self.closed = friction.closed(self.n_window)
+
+    def snapshot(self) -> Snapshot:
+        """What :meth:`restore` needs to return to the present states."""
+        saved = super().snapshot()
+        if self.friction is None:
+            return saved
+        return replace(saved, friction=self.friction.save())
+
+    def restore(self, saved: Snapshot) -> None:
+        """Return to earlier states; only contact, friction and softening may have changed."""
+        super().restore(saved)
+        if isinstance(saved.friction, Committed) and self.friction is not None:
+            self.friction.restore(saved.friction)
+
+    def _set_closed(self, closed: Bools) -> None:
+        if self.friction is None:
+            super()._set_closed(closed)
+        else:
+            self.closed = closed.copy()
+
+    def _take(self, schur: Array, offset: Array | None, free: Ints, bonds: list[SoftBond]) -> None:
+        super()._take(schur, offset, free, bonds)
+        if self.friction is not None:
+            self.free[self.friction.rows] = True
+
+    def _loaded(self, state: Equilibrium) -> Bools:
+        loaded = super()._loaded(state)
+        if self.friction is not None:
+            loaded[self.friction.rows] = True
+        return loaded
+
+    def reduced(self, extra: Ints) -> Array:
+        """S on held components once all that may move is condensed out, shape (k, k)."""
+        if self.friction is None:
+            return super().reduced(extra)
+        return self.friction.condensed(self, extra)
+
+    def rates(self, loads: Array, force: Array) -> tuple[Array, Array]:
+        """Change of jumps and conjugates per change of loads and given forces, states fixed."""
+        if self.friction is None:
+            return super().rates(loads, force)
+        return self.friction.rates(self, loads, force)
+
+    def _rub(
+        self, friction: Friction, start: Equilibrium, loads: Array, force: Array
+    ) -> Iterator[tuple[float, Equilibrium]]:
+        for fraction, point in friction.pieces(self, start, loads, force):
+            self.closed = friction.closed(self.n_window)
+            yield fraction, point
 
     # -- contact -------------------------------------------------------------------------
 
@@ -50,12 +124,18 @@ class JumpSystem(LinearJumps):
     def equilibrium(self, loads: Array, force: Array) -> Equilibrium:
         """Equilibrium with contact: primal-dual active set from the present one.
 
+        With friction, one increment of backward Euler from the committed slips.
+
         A repeated set ends the active-set iteration; a non-negative least-squares problem with
         the same solution, whose solver terminates, takes over.
 
         Raises:
             ConvergenceError: Neither gives a solution.
         """
+        if self.friction is not None:
+            state = self.friction.equilibrium(self, loads, force)
+            self.closed = self.friction.closed(self.n_window)
+            return state
         state = self.linear(loads, force)
         if not self.contact.any():
             return state
@@ -118,6 +198,9 @@ class JumpSystem(LinearJumps):
             between two of them everything is linear. The states change only when the next piece
             is asked for, so a caller may stop in the middle of a piece.
         """
+        if self.friction is not None:
+            yield from self._rub(self.friction, start, loads, force)
+            return
         here, last = 0.0, start
         stuck = done = 0
         while True:

@@ -45,6 +45,25 @@ class Equilibrium:
     conjugate: Array
 
 
+@dataclass(frozen=True)
+class Snapshot:
+    """States to return to.
+
+    Attributes:
+        free: Components whose force is known.
+        closed: Normal components in contact.
+        bonds: Softening bonds.
+        finished: Energy dissipated by those that have opened all the way.
+        friction: States of the frictional contact nodes, if there are any.
+    """
+
+    free: Bools
+    closed: Bools
+    bonds: list[SoftBond]
+    finished: float
+    friction: object = None
+
+
 class LinearJumps:
     """States of the window components and the linear equilibrium they lead to.
 
@@ -160,25 +179,25 @@ class LinearJumps:
         self.release(free)
         self.contact[free] |= self.touches[free]
 
-    def snapshot(self) -> tuple[Bools, Bools, list[SoftBond], float]:
+    def snapshot(self) -> Snapshot:
         """What :meth:`restore` needs to return to the present states."""
-        return (
+        return Snapshot(
             self.free.copy(),
             self.closed.copy(),
             [replace(b) for b in self.soft.bonds],
-            (self.soft.finished),
+            self.soft.finished,
         )
 
-    def restore(self, saved: tuple[Bools, Bools, list[SoftBond], float]) -> None:
+    def restore(self, saved: Snapshot) -> None:
         """Return to earlier states; only contact and softening may have changed since."""
-        free, closed, bonds, self.soft.finished = saved
-        self._set_closed(closed)
-        self.soft.bonds = bonds
-        extra = np.flatnonzero(self.free & ~free)
+        self.soft.finished = saved.finished
+        self._set_closed(saved.closed)
+        self.soft.bonds = saved.bonds
+        extra = np.flatnonzero(self.free & ~saved.free)
         self.contact[extra] = False
         if len(extra):
             self.hold(extra)
-        elif bonds:
+        elif saved.bonds:
             self.soft.refresh(self.cholesky)
 
     def state_dict(self) -> dict[str, Array]:
@@ -246,15 +265,22 @@ class LinearJumps:
         self._unit = loads, jump
         return jump
 
-    def linear(self, loads: Array, force: Array) -> Equilibrium:
-        """Equilibrium with the states as they are, contact conditions unchecked."""
+    def linear(self, loads: Array, force: Array, held: Array | None = None) -> Equilibrium:
+        """Equilibrium with the states as they are, contact conditions unchecked.
+
+        Args:
+            loads: Amplitudes of supports and load factors, shape (n_loads,).
+            force: Given forces, shape (n_window,).
+            held: Jumps of the components that are not free, shape (n_window,); by default 0,
+                closed normals at -gap.
+        """
         free = self.cholesky.free
-        jump = np.where(self.closed, -self.gap, 0.0)
+        jump = np.where(self.closed, -self.gap, 0.0) if held is None else held.copy()
         part = self._response(loads)
         right = force[free]
-        held = np.flatnonzero(jump)
-        if len(held):
-            right = right - self.schur[np.ix_(free, held)] @ jump[held]
+        moved = np.flatnonzero(jump)
+        if len(moved):
+            right = right - self.schur[np.ix_(free, moved)] @ jump[moved]
         if np.any(right):
             part = part + self.cholesky.solve(right)
         jump[free] = part
@@ -318,6 +344,14 @@ class LinearJumps:
         given[mine] = 0.0
         return self.linear(state.loads, given)
 
+    def _loaded(self, state: Equilibrium) -> Bools:
+        """Components that may carry a force though they may have a jump, shape (n_window,)."""
+        return np.asarray(self.closed | (state.force != 0.0))
+
+    def reduced(self, extra: Ints) -> Array:
+        """S on held components once the free ones are condensed out, shape (k, k)."""
+        return self.cholesky.reduced(extra)[1]
+
     def forces(self, state: Equilibrium, rows: Ints) -> Array:
         """Interface forces on the slave side at some components, shape (len(rows),)."""
         return self._product(rows, np.concatenate([state.jump, state.loads]))
@@ -328,7 +362,7 @@ class LinearJumps:
 
     def strain_energy(self, state: Equilibrium) -> float:
         """1/2 u^t K u of a linear continuum: half the work of all forces on their displacements."""
-        rows = np.flatnonzero((state.jump != 0.0) & (self.closed | (state.force != 0.0)))
+        rows = np.flatnonzero((state.jump != 0.0) & self._loaded(state))
         interface = state.jump[rows] @ self.forces(state, rows) if len(rows) else 0.0
         return 0.5 * float(interface + state.loads @ state.conjugate)
 
@@ -352,4 +386,4 @@ def bond_work(a: Equilibrium, b: Equilibrium) -> float:
     return -0.5 * float((a.force + b.force) @ (b.jump - a.jump))
 
 
-__all__ = ["Equilibrium", "LinearJumps", "blend", "bond_work", "work_between"]
+__all__ = ["Equilibrium", "LinearJumps", "Snapshot", "blend", "bond_work", "work_between"]
