@@ -27,7 +27,7 @@ from fxcrack.solve.condensed import CondensedModel, CondensedOptions
 from fxcrack.solve.newton import NewtonOptions
 from fxcrack.steps.cycle_march import CycleMarch
 from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
-from fxcrack.steps.growth import Debond, Growth
+from fxcrack.steps.growth import Debond, Growth, check_friction
 from fxcrack.steps.keeper import Keeper, keeper_of
 from fxcrack.steps.letting_go import Letting, given_forces
 from fxcrack.steps.march import March, Observer
@@ -94,6 +94,7 @@ class Scene:
         self.debonds = list(debonds)
         self.continuum = Continuum(mesh, materials, model, order=order)
         self.pairs = [make_pair(self.continuum, i) for i in interfaces]
+        check_friction(self.debonds, self.pairs)
         self.supports = collect_supports(self.continuum, list(supports))
         self.loads = list(loads)
         self.effects = list(effects)

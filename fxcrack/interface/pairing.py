@@ -36,7 +36,9 @@ class Interface:
         bonded: The initially bonded slave nodes: the name of a group, a function of positions of
             shape (3, n) that returns n booleans, an array of booleans per slave node (in the
             order of ``Pair.surface``), or ``None``: all of them, and no tip exists.
-        contact: Open faces cannot pass through each other (unilateral, frictionless).
+        contact: Open faces cannot pass through each other (unilateral).
+        friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
+            a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.
         normal_only: Bonds hold the opening only and let the faces slip.
         tolerance: Search tolerance, length: how far a slave node may lie from the master surface;
             a tenth of the master's facet size by default.
@@ -50,6 +52,7 @@ class Interface:
     master: str
     bonded: Bonded = None
     contact: bool = False
+    friction: float | Callable[[Array], npt.ArrayLike] | None = None
     normal_only: bool = False
     tolerance: float | None = None
     gap: str = "adjust"
@@ -65,6 +68,28 @@ class Interface:
             )
         if self.gap not in ("adjust", "keep"):
             raise InterfaceError(f"gap = '{self.gap}': choose 'adjust' or 'keep'")
+        self._check_friction()
+
+    def _check_friction(self) -> None:
+        if self.friction is None:
+            return
+        where = f"interface '{self.title}'"
+        if not self.contact:
+            raise InterfaceError(
+                f"{where}: friction needs contact; add contact=True or leave friction out"
+            )
+        if self.normal_only:
+            raise InterfaceError(
+                f"{where}: friction is not possible with bonds in the normal direction only; leave "
+                "out friction, or bond in all directions"
+            )
+        if not callable(self.friction):
+            if isinstance(self.friction, bool) or not isinstance(self.friction, float | int):
+                raise InterfaceError(
+                    f"{where}: friction = {self.friction!r}; give the coefficient, a number such "
+                    "as 0.3, or a function of positions"
+                )
+            check_coefficients(np.atleast_1d(np.asarray(self.friction, dtype=float)), where)
 
     @property
     def title(self) -> str:
@@ -85,6 +110,7 @@ class Pair:
         frames: Columns n, t1, t2 (n, t in 2-D), shape (n_nodes, gdim, gdim).
         gap: Initial normal gap, shape (n_nodes,), length.
         bonded: Initially bonded nodes, shape (n_nodes,).
+        friction: Coefficient of friction per slave node, shape (n_nodes,); ``None`` without.
     """
 
     interface: Interface
@@ -95,11 +121,48 @@ class Pair:
     frames: Array
     gap: Array
     bonded: Bools
+    friction: Array | None = None
 
     @property
     def title(self) -> str:
         """Name in the history."""
         return self.interface.title
+
+
+def check_coefficients(mu: Array, where: str) -> None:
+    """Refuse coefficients of friction that are negative or no numbers.
+
+    Raises:
+        InterfaceError: One of them is.
+    """
+    bad = ~(np.isfinite(mu) & (mu >= 0.0))
+    if np.any(bad):
+        raise InterfaceError(
+            f"{where}: a coefficient of friction is {mu[bad][0]:g}; it must be a finite number, 0 "
+            "or larger"
+        )
+
+
+def friction_of(interface: Interface, surface: FacetSurface) -> Array | None:
+    """Coefficients of friction at the slave nodes, shape (n_nodes,); ``None`` without friction.
+
+    Raises:
+        InterfaceError: A function returns other than one finite number >= 0 per node.
+    """
+    chosen, n = interface.friction, surface.n_nodes
+    if chosen is None:
+        return None
+    if not callable(chosen):
+        return np.full(n, float(chosen))
+    where = f"interface '{interface.title}'"
+    mu = np.asarray(chosen(np.ascontiguousarray(surface.x.T)), dtype=float)
+    if mu.shape != (n,):
+        raise InterfaceError(
+            f"{where}: friction gives shape {mu.shape}; one number for each of the {n} slave nodes "
+            "is needed"
+        )
+    check_coefficients(mu, where)
+    return mu
 
 
 def local_frames(normals: Array, gdim: int) -> Array:
@@ -208,6 +271,7 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
         frames=local_frames(normals, continuum.gdim),
         gap=gap,
         bonded=bonded,
+        friction=friction_of(interface, slave),
     )
 
 

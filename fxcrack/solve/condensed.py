@@ -30,6 +30,7 @@ from fxcrack.solve.iterative_condensation import ColumnStore, IterativeCondensat
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work, work_between
 from fxcrack.solve.petsc_schur import mumps_message
 from fxcrack.solve.rigid import check_held
+from fxcrack.solve.rubbing import FrictionMemory, let_go, meet, nodes_of, rubs
 from fxcrack.solve.softening import SoftBond
 from fxcrack.solve.window import ColumnCost, CostModel, choose_roles
 
@@ -92,6 +93,7 @@ class CondensedModel:
         state: Present equilibrium.
         around: Distances ahead of and behind the tips that the criterion looks at, per pair.
         keep: (pair, slave node) of bonds that still carry a given force.
+        friction_energy: Energy that friction has taken so far.
         timings: Seconds per phase and number of factorisations.
     """
 
@@ -121,6 +123,8 @@ class CondensedModel:
         self._followed: list[Ints] = []
         self._soft: list[SoftBond] = []
         self._taken = 0.0
+        self._rubbed = FrictionMemory.empty(continuum.gdim) if rubs(pairs) else None
+        self.friction_energy = 0.0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
         self._column_cost = ColumnCost.guess(continuum.n_global)
         self._columns: ColumnStore | None = None
@@ -145,7 +149,7 @@ class CondensedModel:
         """
         self.active, self.reach = active, reach
         if hasattr(self, "system"):
-            self._soft, self._taken = self.system.soft.bonds, self.system.soft.finished
+            self._remember()
         self._rebase()
         self.rebases = 0
 
@@ -154,6 +158,12 @@ class CondensedModel:
         self._soft, self._taken = bonds, finished
         if hasattr(self, "system"):
             self.system.soft.bonds, self.system.soft.finished = bonds, finished
+
+    def _remember(self) -> None:
+        """Keep what the states of the interface depend on while the window changes."""
+        self._soft, self._taken = self.system.soft.bonds, self.system.soft.finished
+        if self.system.friction is not None:
+            self._rubbed = FrictionMemory.of(self.system.friction, self.state)
 
     def _rebase(self) -> None:
         self._assemble()
@@ -261,12 +271,17 @@ class CondensedModel:
         for pair, front, index in zip(self.pairs, self.fronts, self.index, strict=True):
             is_open = ~front.bonded
             self.system.gap[index[:, 0][index[:, 0] >= 0]] = pair.gap[index[:, 0] >= 0]
+            if self._rubbed is not None:
+                # their bonds are gone as well, but contact and friction decide on them
+                is_open[nodes_of(pair, front, index)] = False
             free = index[is_open]
             free = free[(free >= 0) & ~np.isin(free, soft)]
             if len(free):
                 self._free_open(pair, index[is_open & pair.paired, 0], free)
             if pair.interface.contact:
                 self._let_touch(pair, front, index)
+        if self._rubbed is not None:
+            meet(self.system, self.pairs, self.fronts, self.index, self._rubbed)
         self.system.soft.finished = self._taken
         if bonds:
             self.system.contact[soft] = False
@@ -308,7 +323,7 @@ class CondensedModel:
         Given forces are lost: the caller sets them again (see :meth:`solve`).
         """
         self.rebases += 1
-        self._soft, self._taken = self.system.soft.bonds, self.system.soft.finished
+        self._remember()
         loads = self.state.loads
         self._rebase()
         self.state = Equilibrium(
@@ -408,7 +423,7 @@ class CondensedModel:
             slot = index >= 0
             if force[i, : len(nodes), 0].sum() <= 0.0:
                 slot[:, 0] = False  # pressed together: it stays closed, shear alone is released
-            _, star = self.system.cholesky.reduced(index[slot])
+            star = self.system.reduced(index[slot])
             try:
                 factor = self.system.cholesky.factorise(star, index[slot])
             except NotPositiveDefinite:
@@ -481,6 +496,11 @@ class CondensedModel:
             NotPositiveDefinite: A body would come free; nothing is changed.
         """
         system, state = self.system, self.state
+        if system.friction is not None and self.pairs[p].interface.contact:
+            force = let_go(system, p, self.pairs[p], self.index[p], nodes, state)
+            self.fronts[p].release(nodes)
+            self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
+            return
         components = self.components(p, nodes)
         components = components[~system.free[components]]
         force = state.force.copy()
@@ -510,6 +530,7 @@ class CondensedModel:
         for _, point in self.system.pieces(last, last.loads, force):
             more, out, _ = self.along(last, point)
             work, released = work + more, released + out
+            self.rub(last, point)
             last = point
         self.state = last
         return released, work
@@ -533,6 +554,11 @@ class CondensedModel:
     def strain_energy(self, state: Equilibrium) -> float:
         """Energy stored in the bodies."""
         return self.system.strain_energy(state)
+
+    def rub(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Account for the energy friction takes along a linear piece."""
+        if self.system.friction is not None:
+            self.friction_energy += self.system.friction.dissipation(self.system, here, point)
 
     # -- displacements that criteria follow ----------------------------------------------
 

@@ -14,7 +14,7 @@ by node relaxation (Jean 1999), which lowers the energy at given friction bounds
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -28,10 +28,15 @@ Ints = npt.NDArray[np.int64]
 OPEN, STICK, SLIP = 0, 1, 2
 """What a node does; a node without friction that is closed slips."""
 
-_STEPS = 40
-"""Newton steps before relaxation; an active set that settles does so in about ten."""
-_ROUNDS = 8
-_SWEEPS = 30
+_STEPS = 25
+"""Newton steps in a row; an active set that settles does so in about ten."""
+_SETTLED = 1e-11
+"""Largest error of the laws, relative to the largest force."""
+_SHORTEST = 1.0 / 64.0
+"""Shortest part of a Newton step that is tried."""
+_ROUNDS = 6
+_SWEEPS = 20
+"""Sweeps of the first relaxation; each further one has twice as many."""
 ROUND_OFF = 1e-11
 """Gaps, slips and forces below this fraction of the largest one count as zero."""
 _SINGULAR = 1e-13
@@ -81,7 +86,7 @@ class NodeStates:
     def key(self) -> bytes:
         """Equal for equal states."""
         signs = np.sign(self.direction) * (self.status == SLIP)[:, None]
-        return self.status.tobytes() + (signs + 0.0).tobytes()
+        return bytes(self.status.tobytes() + (signs + 0.0).tobytes())
 
     def switched(self, nodes: Ints, status: Ints, direction: Array) -> NodeStates:
         """Other states at some nodes."""
@@ -192,22 +197,29 @@ def backward_euler(
     Raises:
         ConvergenceError: No solution was found.
     """
-    found, steps, jump = None, 0, start
+    newton = _Newton(block, load, reference)
     slid = False
-    for _ in range(_ROUNDS):
-        try:
-            found, done = _newton(block, load, reference, states)
-            steps += done
-        except Sliding:
-            slid = True
-        if found is not None:
-            return replace(found, steps=steps)
-        jump, states = _relax(block, load, reference, jump)
-    force = block.forces(jump, load)
+    try:
+        newton.try_jump(jumps_of(block, load, states, reference), states)
+    except Sliding:
+        slid = True
+        newton.try_jump(start, states)
+    for attempt in range(_ROUNDS):
+        for damped in (False, True):
+            try:
+                found = newton.run(damped=damped)
+            except Sliding:
+                slid, found = True, None
+            if found is not None:
+                return found
+        relaxed, states = _relax(block, load, reference, newton.best, _SWEEPS * 2**attempt)
+        newton.least = np.inf
+        newton.try_jump(relaxed, states)
+    states = newton.states
     raise ConvergenceError(
         f"friction: no equilibrium found for {len(block.mu)} contact nodes "
         f"({int((states.status == STICK).sum())} stick, {int((states.status == SLIP).sum())} slip, "
-        f"largest pressure force {force[:, 0].max(initial=0.0):.3g})"
+        f"forces out of balance by {newton.least:.1e} of the largest one)"
         + (
             "; a body that friction alone should hold slides: support it, or pull it by a "
             "prescribed displacement"
@@ -217,41 +229,74 @@ def backward_euler(
     )
 
 
-def _newton(
-    block: ContactBlock, load: Array, reference: Array, states: NodeStates
-) -> tuple[Increment | None, int]:
-    """Semismooth Newton steps from given states; ``None`` if they do not settle."""
-    m, d = len(block.mu), block.dim
-    r = np.diagonal(block.stiffness).reshape(m, d).max(axis=1)
-    lean: tuple[Array, Array] | None = None
-    seen: set[bytes] = set()
-    for step in range(1, _STEPS + 1):
-        jump = jumps_of(block, load, states, reference, lean)
-        force = block.forces(jump, load)
-        new, lean, error = _next_states(block, jump, force, reference, states, r)
-        # a direction that turns is no new state but has to settle as well
-        settled = np.array_equal(new.status, states.status) and error <= 1e-10
-        if settled:
-            return Increment(jump, force, new, step), step
-        states = new
-        if d == 2:
-            key = states.key()
-            if key in seen:
-                return None, step
+class _Newton:
+    """Semismooth Newton steps; the best jumps so far are kept.
+
+    Attributes:
+        jump: Present jumps.
+        best: Jumps of the least error so far.
+        states: What the nodes do there.
+        least: That error, relative to the forces.
+    """
+
+    def __init__(self, block: ContactBlock, load: Array, reference: Array) -> None:
+        self.block, self.load, self.reference = block, load, reference
+        m, d = len(block.mu), block.dim
+        self.r = np.diagonal(block.stiffness).reshape(m, d).max(axis=1)
+        self.scale = max(np.abs(load).max(initial=0.0), np.abs(self.r * block.gap).max(initial=0.0))
+        self.least = np.inf
+        self.steps = 0
+
+    def try_jump(self, jump: Array, states: NodeStates) -> float:
+        """Go to jumps and find the states the projections give; the error there."""
+        force = self.block.forces(jump, self.load)
+        new, self.lean, error = _project(
+            self.block, jump, force, self.reference, states, self.r, self.scale
+        )
+        self.jump, self.force, self.states, self.error = jump, force, new, error
+        if error < self.least:
+            self.least, self.best, self.best_states = error, jump, new
+        return error
+
+    def run(self, *, damped: bool) -> Increment | None:
+        """Steps from the best jumps; ``None`` if they do not settle."""
+        error = self.try_jump(self.best, self.best_states)
+        seen: set[bytes] = set()
+        for _ in range(_STEPS):
+            if error <= _SETTLED:
+                return Increment(self.jump, self.force, self.states, self.steps)
+            key = self.states.key()
+            if not damped and self.block.dim == 2 and key in seen:
+                return None
             seen.add(key)
-    return None, _STEPS
+            self.steps += 1
+            old, states = self.jump, self.states
+            new = jumps_of(self.block, self.load, states, self.reference, self.lean)
+            before, error = error, self.try_jump(new, states)
+            part = 1.0
+            while damped and error > (1.0 - 0.1 * part) * before:
+                part *= 0.5
+                if part < _SHORTEST:
+                    return None
+                error = self.try_jump(old + part * (new - old), states)
+        return None
 
 
-def _next_states(
-    block: ContactBlock, jump: Array, force: Array, reference: Array, old: NodeStates, r: Array
+def _project(
+    block: ContactBlock,
+    jump: Array,
+    force: Array,
+    reference: Array,
+    old: NodeStates,
+    r: Array,
+    scale: float,
 ) -> tuple[NodeStates, tuple[Array, Array], float]:
-    """States by the projections of Alart and Curnier; beta and r; error of the slip law."""
+    """States by the projections of Alart and Curnier; beta and r; the largest error of the laws."""
     was_closed, stuck = old.status != OPEN, old.status == STICK
-    small = ROUND_OFF * max(np.abs(force).max(initial=0.0), float(np.abs(r * block.gap).max()))
+    small = ROUND_OFF * scale
     normal = force[:, 0] - r * (jump[:, 0] + block.gap)
     # on the edge a node stays what it was
-    closed = normal >= np.where(was_closed, -small, small)
-    closed &= was_closed | (normal > 0.0)
+    closed = np.where(was_closed, normal >= -small, normal > small)
     slip = jump[:, 1:] - reference
     trial = force[:, 1:] - r[:, None] * slip
     size = np.linalg.norm(trial, axis=1)
@@ -262,19 +307,19 @@ def _next_states(
     slips = closed & ~sticks
     status = np.where(sticks, STICK, np.where(slips, SLIP, OPEN))
     turned = slips & (size > small)
-    direction = np.where(
-        turned[:, None], -trial / np.where(turned, size, 1.0)[:, None], old.direction
-    )
-    away = force[:, 1:] + block.mu[:, None] * force[:, :1] * direction
-    error = np.abs(away[slips]).max(initial=0.0)
-    scale = np.abs(force).max(initial=0.0)
-    beta = np.where(turned, np.minimum(bound / np.where(turned, size, 1.0), 1.0), 0.0)
-    relative = float(error / scale) if error > 0.0 else 0.0
-    return NodeStates(status, direction), (beta, r), relative
+    length = np.where(turned, size, 1.0)
+    direction = np.where(turned[:, None], -trial / length[:, None], old.direction)
+    beta = np.where(turned, np.minimum(bound / length, 1.0), 0.0)
+    inside = np.where(size > bound, bound / np.where(size > 0.0, size, 1.0), 1.0)
+    off = np.maximum(
+        np.abs(force[:, 0] - np.maximum(normal, 0.0)),
+        np.linalg.norm(force[:, 1:] - inside[:, None] * trial, axis=1),
+    ).max(initial=0.0)
+    return NodeStates(status, direction), (beta, r), float(off / scale) if off > 0.0 else 0.0
 
 
 def _relax(
-    block: ContactBlock, load: Array, reference: Array, jump: Array
+    block: ContactBlock, load: Array, reference: Array, jump: Array, sweeps: int
 ) -> tuple[Array, NodeStates]:
     """Solve node by node, the others held, in sweeps."""
     m, d = len(block.mu), block.dim
@@ -285,12 +330,17 @@ def _relax(
     direction = np.zeros((m, d - 1))
     direction[:, 0] = 1.0
     residual = load - k @ flat
-    for _ in range(_SWEEPS):
+    for _ in range(sweeps):
         for i in range(m):
             own = slice(i * d, (i + 1) * d)
             here = ContactBlock(k[own, own], block.gap[i : i + 1], block.mu[i : i + 1])
             right = residual[own] + here.stiffness @ flat[own]
-            new, status[i], direction[i] = _alone(here, right, reference[i : i + 1], direction[i])
+            try:
+                new, status[i], direction[i] = _alone(
+                    here, right, reference[i : i + 1], direction[i]
+                )
+            except (Sliding, np.linalg.LinAlgError):
+                continue  # nothing holds it but its neighbours
             change = new - flat[own]
             if np.any(change):
                 residual -= k[:, own] @ change

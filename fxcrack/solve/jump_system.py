@@ -16,6 +16,7 @@ from scipy.optimize import nnls
 
 from fxcrack.errors import ConvergenceError
 from fxcrack.solve.friction import Committed, Friction
+from fxcrack.solve.friction_path import follow
 from fxcrack.solve.linear_jumps import (
     Equilibrium,
     LinearJumps,
@@ -99,7 +100,7 @@ class JumpSystem(LinearJumps):
     def _rub(
         self, friction: Friction, start: Equilibrium, loads: Array, force: Array
     ) -> Iterator[tuple[float, Equilibrium]]:
-        for fraction, point in friction.pieces(self, start, loads, force):
+        for fraction, point in follow(friction, self, start, loads, force):
             self.closed = friction.closed(self.n_window)
             yield fraction, point
 

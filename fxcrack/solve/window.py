@@ -1,8 +1,9 @@
 """Which jump components take part in the condensation, and when to factor again.
 
 Ahead of the front the window holds the bonded nodes the crack may reach before the next rebase;
-behind it, the wake the criterion looks at; with contact, all open normals. How far it reaches is
-the number of nodes k that costs least. With a factorisation per window:
+behind it, the wake the criterion looks at; with contact, all open normals, and with friction all
+open components of interfaces with contact. How far it reaches is the number of nodes k that costs
+least. With a factorisation per window:
 ceil(L/k) (t_plain + c n(k)^2), L nodes to go, n window components, c the cost of an entry of S.
 With columns by iteration, each computed once: (L/k) t_window + t_column (n(k) - n(0))/2, the last
 window being half used on average. The constants are refitted from what was measured last.
@@ -145,6 +146,7 @@ def choose_roles(
         InputError: Even the smallest useful window exceeds the cap.
     """
     roles, waiting = [], []
+    friction = any(pair.friction is not None for pair in pairs)
     n_fixed = 0
     for p, (pair, front, on, far) in enumerate(zip(pairs, fronts, active, reach, strict=True)):
         ahead, behind = (0.0, 0.0) if around is None else around[p]
@@ -156,6 +158,8 @@ def choose_roles(
         is_open = ~front.bonded & pair.paired
         if pair.interface.contact:
             role[is_open, 0] = WINDOW
+            if friction:
+                role[is_open] = WINDOW
         if on and is_open.any() and bonded.any():
             x = pair.surface.x
             tips = front.candidates()

@@ -150,6 +150,7 @@ class Account:
         work, released, mean = self.model.along(here, point)
         self.work += work
         self.released += released
+        self.model.rub(here, point)
         for ramp in self._ramps:
             index = self.model.components(ramp.p, ramp.nodes)
             force, last = here.force[index], point.force[index]
@@ -307,7 +308,9 @@ class Account:
             row["viscous_energy"] = self.viscous
         if model.system.soft.bonds or model.system.soft.finished:
             row["snap_energy"] = self.snapped
-        row["balance"] = self.work - energy - self.released
+        if model.system.friction is not None:
+            row["friction_energy"] = model.friction_energy
+        row["balance"] = self.work - energy - self.released - model.friction_energy
         self.history.append(row)
         if self._observer is not None:
             self._observer(event, row)

@@ -39,6 +39,8 @@ Ints = npt.NDArray[np.int64]
 _GRID = np.linspace(0.0, 1.0, 5)
 _HALVINGS = 8
 """How often a piece of the cycle on which contact changes is halved at most."""
+_SETTLING = 20
+"""Cycles that friction gets to settle."""
 
 
 class CycleMarch(March):
@@ -144,18 +146,31 @@ class CycleMarch(March):
         """What the cycle does at the tips of each interface; the state stays at the maximum."""
         system = self.model.system
         ends = [loads for _, loads in self._corners[1:]]
-        if len(ends) > 1:
+        if len(ends) > 1 or system.friction is not None:
             ends.append(self._corners[0][1])
         saved = system.snapshot()
-        corners = [self._instant(self.model.state)]
-        for loads in ends:
-            corners += self._way_to(corners[-1].state, loads)
-        largest: Array = np.stack([self._totals(c.measured) for c in corners]).max(axis=0)
+        corners, largest = self._once(self._instant(self.model.state), ends)
+        if system.friction is not None:
+            # slips settle over some cycles
+            for _ in range(_SETTLING):
+                before = largest
+                corners, largest = self._once(corners[-1], ends)
+                if np.all(np.abs(largest - before) <= self.cycles.change * largest):
+                    break
+            else:
+                log.warn("friction does not settle in the cycle at N = %g", self.fatigue.N)
         way = corners[:1]
         for a, b in pairwise(corners):
             way += self._between(a, b, largest, _HALVINGS)
         system.restore(saved)
         return self._extremes(way)
+
+    def _once(self, start: _Instant, ends: list[Array]) -> tuple[list[_Instant], Array]:
+        """Instants of one cycle and the largest rate at each tip."""
+        corners = [start]
+        for loads in ends:
+            corners += self._way_to(corners[-1].state, loads)
+        return corners, np.stack([self._totals(c.measured) for c in corners]).max(axis=0)
 
     def _instant(self, state: Equilibrium, *, straight: bool = False) -> _Instant:
         measured = [
@@ -167,8 +182,8 @@ class CycleMarch(March):
     def _way_to(self, start: Equilibrium, loads: Array) -> list[_Instant]:
         """Instants from an equilibrium (left out) to other loads."""
         system, force = self.model.system, self._force_at(self.time)
-        if system.soft.bonds:
-            # bonds an earlier step left half-way remember how they were loaded
+        if system.soft.bonds or system.friction is not None:
+            # friction, and bonds an earlier step left half-way remember how they were loaded
             path = system.pieces(start, loads, force)
             return [self._instant(point, straight=True) for _, point in path]
         return [self._instant(system.equilibrium(loads, force))]

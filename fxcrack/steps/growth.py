@@ -21,7 +21,7 @@ from fxcrack.criteria import (
 from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Tips
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.pairing import Interface, Pair
 from fxcrack.interface.path import SurfacePaths
 from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
@@ -84,6 +84,27 @@ class Debond:
                 "Progressive, an amplitude of time serves the critical stress, opening and crack "
                 "length criteria"
             )
+
+
+def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
+    """Refuse bonds that soften with their opening beside friction.
+
+    Raises:
+        InputError: A debond has such a release law.
+    """
+    rough = [pair.title for pair in pairs if pair.friction is not None]
+    for debond in debonds:
+        if rough and softens(debond):
+            raise InputError(
+                f"interface '{debond.interface.title}' lets go progressively with its opening, "
+                f"which is not possible beside friction (interface '{rough[0]}'); release by Step, "
+                "Ramp(increments=...) or an amplitude, or leave friction out"
+            )
+
+
+def softens(debond: Debond) -> bool:
+    """Whether bond forces fall with their opening."""
+    return debond.release.driver == "opening" or isinstance(debond.criterion, EnhancedVCCT)
 
 
 class Growth:
@@ -168,7 +189,7 @@ class Growth:
     @property
     def opening_driven(self) -> bool:
         """Whether bond forces fall with their opening."""
-        return self.debond.release.driver == "opening" or isinstance(self.criterion, EnhancedVCCT)
+        return softens(self.debond)
 
     def energy_to_spend(self, nodes: Ints, values: TipValues) -> Array:
         """Energy that nodes which soften have to dissipate, shape (n,).

@@ -224,11 +224,11 @@ class March(Account):
     def _books(self) -> Any:
         """What :meth:`_undo` needs to return to the present equilibrium."""
         kept = (self.time, self.model.state, self.work, self.released, self._by_force, self.viscous)
-        return kept, self.model.remember(), self._values
+        return kept, self.model.remember(), self._values, self.model.friction_energy
 
     def _undo(self, books: Any) -> float:
         """Return to an earlier equilibrium, with the same bonds, and its time."""
-        kept, states, self._values = books
+        kept, states, self._values, self.model.friction_energy = books
         (
             self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
         ) = kept  # fmt: skip
