@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import solve_triangular
 
+from fxcrack.errors import ConvergenceError
 from fxcrack.solve.coulomb import (
     OPEN,
     SLIP,
@@ -21,6 +22,7 @@ from fxcrack.solve.coulomb import (
     ContactBlock,
     Increment,
     NodeStates,
+    Sliding,
     backward_euler,
     jumps_of,
 )
@@ -220,12 +222,22 @@ class Friction:
         return np.asarray(star[n:, n:] - y.T @ y)
 
     def rates(self, system: LinearJumps, loads: Array, force: Array) -> tuple[Array, Array]:
-        """Rates of jumps, shape (n_window,), and conjugates, shape (n_loads,), states fixed."""
+        """Rates of jumps, shape (n_window,), and conjugates, shape (n_loads,), states fixed.
+
+        Raises:
+            ConvergenceError: A body slides.
+        """
         none = np.zeros(system.n_window)
         idle = np.zeros(len(loads))
         load = self.load(system, loads, force) - self.load(system, idle, none)
         block = ContactBlock(self.block(system).stiffness, np.zeros(len(self.gap)), self.mu)
-        jump = jumps_of(block, load, self.states, np.zeros(self.reference.shape))
+        try:
+            jump = jumps_of(block, load, self.states, np.zeros(self.reference.shape))
+        except Sliding as error:
+            raise ConvergenceError(
+                "friction: a body that friction alone holds slides; support it, or pull it by a "
+                "prescribed displacement"
+            ) from error
         one = system.linear(loads, force, self.over(jump, system.n_window))
         zero = system.linear(idle, none, none)
         return one.jump - zero.jump, one.conjugate - zero.conjugate

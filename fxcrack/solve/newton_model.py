@@ -33,6 +33,7 @@ from fxcrack.solve.condensed import CondensedModel, CondensedOptions
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
 from fxcrack.solve.newton import Counts, InterfaceProblem, NewtonOptions
 from fxcrack.solve.rigid import check_held
+from fxcrack.solve.rubbing import Slide
 from fxcrack.terms.bodies import Bodies
 
 Array = npt.NDArray[np.float64]
@@ -54,6 +55,7 @@ class Move:
         conjugate: Integral of the conjugates over s, shape (n_loads,).
         jump: Integral of the jumps over s, shape (n_window,).
         bonds: Energy that bonds which are letting go took out on the way.
+        friction: Energy that friction took on the way.
     """
 
     start: Equilibrium
@@ -61,6 +63,7 @@ class Move:
     conjugate: Array
     jump: Array
     bonds: float
+    friction: float
 
 
 class NewtonModel(CondensedModel):
@@ -346,6 +349,7 @@ class NewtonModel(CondensedModel):
             points.append((1.0, self.system.equilibrium(loads, force)))
         predicted = points[-1][1]
         rate = self.system.rates(loads - here.loads, force - here.force)
+        slide = None if self.system.friction is None else Slide.of(self.system, points)
         self.timings.add("interface", start)
         soft = self.system.soft.components
         y = self._toward(predicted)
@@ -382,6 +386,7 @@ class NewtonModel(CondensedModel):
             _along(points, "conjugate") + conjugate,
             _along(points, "jump") + jump,
             bonds + float(given @ jump),
+            0.0 if slide is None else slide.energy(self.system, end),
         )
         return end
 
@@ -443,6 +448,12 @@ class NewtonModel(CondensedModel):
         work -= move.conjugate[n:] @ (b - a)[n:]
         return float(work), move.bonds, move.jump
 
+    def rub(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Account for the energy friction took in the last move."""
+        move = self.last_move
+        assert move is not None and move.start is here and move.end is point
+        self.friction_energy += move.friction
+
     def release(self, p: int, nodes: Ints, force: Array) -> tuple[float, float]:
         """Let nodes go at constant load, in as many pieces as the iteration needs.
 
@@ -466,6 +477,7 @@ class NewtonModel(CondensedModel):
                 continue
             more, out, _ = self.along(here, end)
             work, energy = work + more, energy + out
+            self.rub(here, end)
             self.accept()
             done = to
         return energy, work

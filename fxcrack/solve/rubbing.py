@@ -6,6 +6,7 @@ The states belong to slave nodes of pairs; the window numbers them anew at every
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -77,6 +78,50 @@ class FrictionMemory:
             np.asarray(state["reference"], dtype=float),
             float(state["error"][0]),
         )
+
+
+@dataclass(frozen=True)
+class Slide:
+    """Energy that friction takes on a way that is predicted on a tangent and corrected at its end.
+
+    Attributes:
+        predicted: Energy on the predicted way.
+        start: Tangential jumps at its beginning, shape (m, d - 1), length.
+        jump: Those predicted for its end.
+        traction: Tangential contact forces predicted there, shape (m, d - 1).
+    """
+
+    predicted: float
+    start: Array
+    jump: Array
+    traction: Array
+
+    @classmethod
+    def of(cls, system: JumpSystem, points: list[tuple[float, Equilibrium]]) -> Slide:
+        """The predicted way, while the system still holds the tangent it was predicted on."""
+        friction = system.friction
+        assert friction is not None
+        end = points[-1][1]
+        return cls(
+            sum(friction.dissipation(system, a, b) for (_, a), (_, b) in pairwise(points)),
+            friction.of(points[0][1].jump)[:, 1:],
+            friction.of(end.jump)[:, 1:],
+            friction.traction(system, end)[:, 1:],
+        )
+
+    def energy(self, system: JumpSystem, end: Equilibrium) -> float:
+        """Energy up to the corrected end, on whose tangent the system is now.
+
+        The corrections of slips and forces grow with the square of the way.
+        """
+        friction = system.friction
+        assert friction is not None
+        rough = friction.mu > 0.0
+        more = (friction.of(end.jump)[:, 1:] - self.jump)[rough]
+        change = friction.traction(system, end)[rough, 1:] - self.traction[rough]
+        lost = np.sum((self.traction[rough] + 0.5 * change) * more)
+        lost += np.sum(change * (self.jump - self.start)[rough]) / 3.0
+        return self.predicted - float(lost)
 
 
 def rubs(pairs: list[Pair]) -> bool:
