@@ -20,6 +20,7 @@ from fxcrack.criteria import (
 )
 from fxcrack.criteria import Ramp as OpeningRamp
 from fxcrack.errors import FxcrackError, InputError
+from fxcrack.inertia import Inertia
 from fxcrack.interface.pairing import Interface
 from fxcrack.interrupt import Interrupted
 from fxcrack.loads import (
@@ -35,7 +36,7 @@ from fxcrack.loads import (
 from fxcrack.materials import Isotropic, Orthotropic
 from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
 from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
-from fxcrack.nonlinear_materials import NeoHookean
+from fxcrack.nonlinear_materials import NeoHookean, Plastic
 from fxcrack.output import plots
 from fxcrack.output.bonds import BondHistory, bond_table, write_releases
 from fxcrack.output.checkpoint import Checkpoint, checkpoints
@@ -76,6 +77,7 @@ __all__ = [
     "FieldSeries",
     "FxcrackError",
     "History",
+    "Inertia",
     "InputError",
     "Interface",
     "Interrupted",
@@ -88,6 +90,7 @@ __all__ = [
     "Paris",
     "PlaneStrain",
     "PlaneStress",
+    "Plastic",
     "PointForce",
     "Power",
     "Pressure",

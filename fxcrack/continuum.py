@@ -53,6 +53,7 @@ class Continuum:
         degree: Quadrature degree of all integrals.
         parts: Stiffness on the model's strains, all stresses per strain, and measure, per material.
         part_materials: The material of each part.
+        part_cells: Owned cells of each part.
         temperature: The temperature on this mesh, ``None`` where there is none.
 
     Raises:
@@ -99,6 +100,7 @@ class Continuum:
 
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
         self.part_materials: list[Material] = []
+        self.part_cells: list[Ints] = []
         self.parts = self._assign(materials)
         self._form: Any = None
 
@@ -107,6 +109,8 @@ class Continuum:
         domain, meta = self.mesh.domain, {"quadrature_degree": self.degree}
         if not isinstance(materials, Mapping):
             self.part_materials = [materials]
+            n = domain.topology.index_map(self.mesh.tdim).size_local
+            self.part_cells = [np.arange(n, dtype=np.int32)]
             return [(*self._moduli(0), ufl.dx(domain, metadata=meta))]
         n_cells = domain.topology.index_map(self.mesh.tdim).size_local
         count = np.zeros(n_cells, dtype=np.int32)
@@ -125,6 +129,7 @@ class Continuum:
             )
         agree(self.comm, bad)
         self.part_materials = list(materials.values())
+        self.part_cells = [c[c < n_cells] for c in cells]
         entities, tags = np.concatenate(cells), np.concatenate(values)
         sort = np.argsort(entities)
         marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])

@@ -189,7 +189,7 @@ def solve(
     u = bodies.u.x.array[: c.n_local].copy()
     want = np.zeros(c.n_local)
     if values is not None:
-        want = values(c.positions()[: c.n_local // c.gdim]).ravel()
+        want = values(c.positions()[: c.n_local // c.gdim])[:, : c.gdim].ravel()
     step = np.zeros(c.n_local)
     step[dofs] = want[dofs] - u[dofs]
     force = np.zeros(c.n_local) if load is None else load

@@ -152,6 +152,7 @@ class Bodies:
         """An increment of dt ends at a time; collective."""
         for term in self.terms:
             term.begin(time_end, dt)
+            term.update(self.u)
 
     def commit(self) -> None:
         """Accept the present displacement."""
