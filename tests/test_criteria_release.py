@@ -119,7 +119,7 @@ def test_viscous_release_lags_and_catches_up() -> None:
     for n in (50, 100, 200):
         release = viscous(0.5)
         for k in range(n):
-            release.accept(2.0 / n * (k + 1))
+            release.accept(2.0 / n * (k + 1), None)  # type: ignore[arg-type]
         errors.append(abs(release.remaining - np.exp(-4.0)))
     assert np.log2(np.array(errors[:-1]) / errors[1:]) == pytest.approx([1.0, 1.0], abs=0.1)
 

@@ -175,6 +175,49 @@ def test_viscosity_spends_energy_and_fades_with_small_increments():
     assert 0.0 < spent[1e-3]
 
 
+@pytest.mark.parametrize("kind", ["enhanced", "progressive"])
+def test_viscosity_of_softening_bonds_fades_with_mu_and_the_increment(kind):
+    propagation = 0.15 if kind == "enhanced" else TOUGHNESS
+
+    def grown(viscosity, size):
+        rates = {"GIc": TOUGHNESS, "viscosity": viscosity}
+        criterion = (
+            fx.EnhancedVCCT(**rates, GIc_p=propagation) if kind == "enhanced" else fx.VCCT(**rates)
+        )
+        release = fx.Step() if kind == "enhanced" else fx.Progressive()
+        scene, bond = beam(release, criterion)
+        end = fx.CrackLength(bond, 32.0)
+        step = {"stepping": "increment", "initial": size, "maximum": size, "max_cutbacks": 40}
+        history = scene.run(fx.Static(until=end, **step))
+        assert history.reason.startswith("crack length 32")
+        last = history.rows[-1]
+        # forces are given within an increment, so all is linear there
+        assert abs(last["balance"]) < 1e-9 * last["external_work"]
+        scene.close()
+        return last
+
+    quiet, some, much = grown(0.0, 4e-3), grown(4e-3, 4e-3), grown(4e-2, 4e-3)
+    assert "viscous_energy" not in quiet
+    assert 0.0 < some["viscous_energy"] < much["viscous_energy"]
+    # it delays: the same crack needs more load
+    load = [r["R[pin_top.y]"] for r in (quiet, some, much)]
+    assert load[0] < load[1] < load[2]
+    # with mu and the increment, a quarter of both, it goes, but for what runs away at each onset
+    # without viscosity, which is now lost in viscosity
+    fine = grown(1e-3, 1e-3)
+    lost = [r["viscous_energy"] - quiet["snap_energy"] for r in (fine, some)]
+    assert 0.0 < lost[0] < 0.45 * lost[1]
+    # the fracture energy is that of the law: one node of an area of 1 has opened all the way
+    assert fine["released_energy"] == pytest.approx(propagation, rel=1e-9)
+    assert fine["R[pin_top.y]"] - load[0] < 0.5 * (load[1] - load[0])
+
+
+def test_viscosity_and_a_ramp_over_increments_do_not_go_together():
+    scene, bond = beam(Ramp(increments=3), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
+    with pytest.raises(fx.InputError, match="viscosity delays a release at once or with the open"):
+        scene.run(fx.Static(until=fx.CrackLength(bond, 34.0), stepping="increment"))
+
+
 def test_viscosity_needs_increments():
     scene, bond = beam(fx.Step(), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
     with pytest.raises(fx.InputError, match="viscosity acts over increments"):

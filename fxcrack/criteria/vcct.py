@@ -148,7 +148,8 @@ class VCCT(RateCriterion):
     Attributes:
         unstable_tolerance: f_tol of unstable growth: several nodes may go at one load while
             1 + tolerance <= f <= 1 + unstable_tolerance. None: off; math.inf: unlimited.
-        viscosity: Viscous regularisation of released nodes [time]; 0: none.
+        viscosity: Viscous regularisation mu of released nodes, also of those that soften [time];
+            0: none.
     """
 
     unstable_tolerance: float | None = field(default=None, kw_only=True)

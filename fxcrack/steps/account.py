@@ -26,8 +26,10 @@ from fxcrack.steps.letting_go import (
     Letting,
     TimedRelease,
     ViscousRelease,
+    ViscousSoftening,
     bond_forces_of,
     given_forces,
+    still_pulling,
 )
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength, Releases, Time
@@ -159,6 +161,9 @@ class Account:
             self._by_force += spent
             if isinstance(ramp, ViscousRelease):
                 self.viscous += spent
+            elif isinstance(ramp, ViscousSoftening):
+                law = [ramp.fracture_energy(self.model, s.jump) for s in (here, point)]
+                self.viscous += spent - (law[1] - law[0])
         self.model.state = point
         self.time = time
 
@@ -188,17 +193,19 @@ class Account:
     def _open(self, g: Growth, nodes: Ints, values: TipValues) -> None:
         law = g.debond.release
         viscosity = getattr(g.criterion, "viscosity", 0.0)
-        if viscosity > 0.0 and not g.opening_driven and isinstance(law, Step):
-            force = bond_forces_of(self.model, g.p, nodes)
-            self._ramps.append(ViscousRelease(g.p, nodes, force, viscosity, self.time))
-            self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
-            self.model.open(g.p, nodes)
-            return
-        if not g.opening_driven and not isinstance(law, Step):
+        ramp: Letting | None = None
+        if g.opening_driven:
+            if viscosity > 0.0:
+                spend = g.energy_to_spend(nodes, values)
+                ramp = ViscousSoftening.begin(self.model, g.p, nodes, spend, viscosity, self.time)
+        elif not isinstance(law, Step):
             now = self.time if law.driver == "time" else float(self.increment)
             ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)
-            left = [r for r in self._ramps if r.fraction(r.now(self.time, self.increment)) > 0.0]
-            self._ramps[:] = [*left, ramp]
+        elif viscosity > 0.0:
+            force = bond_forces_of(self.model, g.p, nodes)
+            ramp = ViscousRelease(g.p, nodes, force, viscosity, self.time)
+        if ramp is not None:
+            self._ramps[:] = [*still_pulling(self._ramps, self.time, self.increment), ramp]
             self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
             self.model.open(g.p, nodes)
             return

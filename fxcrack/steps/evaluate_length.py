@@ -140,7 +140,7 @@ class LengthEvaluator:
         way = self._begin[tips.node] - self.reference + measured[:, 2:]
         length = np.linalg.norm(way, axis=1) + self._grown[tips.node]
         f = self.criterion.fraction(measured[:, 0], length, tips.d_behind)
-        begun = measured[:, 1] > 1.0 - _SAME_TIME
+        begun = measured[:, 1] > 1.0 - 1e-12  # between two states it is 1 up to round-off, or not
         return np.where(begun & self._moves[tips.node], f, 0.0), {"length": length}
 
     def needs(self, tips: Tips) -> Ints:

@@ -93,7 +93,7 @@ class ViscousRelease:
         """Remaining fraction at the end of an increment."""
         return self.remaining * self.viscosity / (self.viscosity + max(now - self.time, 0.0))
 
-    def accept(self, time: float) -> None:
+    def accept(self, time: float, model: CondensedModel) -> None:
         """Go on from the end of an accepted increment."""
         self.remaining, self.time = self.fraction(time), time
 
@@ -106,7 +106,105 @@ class ViscousRelease:
         return time
 
 
-Letting = TimedRelease | ViscousRelease
+@dataclass
+class ViscousSoftening:
+    """Nodes whose softening with opening is delayed: D_v follows D = w/w_f.
+
+    dD_v/dt = (D - D_v)/mu; the force left is (1 - D_v) F0. One step of implicit Euler per increment
+    takes D from the end of the one before, so that forces are known when an increment begins:
+    D_v <- (dt D + mu D_v)/(dt + mu). The softening law is met as mu and dt go to zero.
+
+    Attributes:
+        p: Number of the pair.
+        nodes: Slave nodes, shape (n,).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        final: w_f, shape (n,), length.
+        viscosity: mu, time.
+        time: Time of the last accepted increment.
+        damage: D then, shape (n,).
+        lagging: D_v then, shape (n,).
+    """
+
+    p: int
+    nodes: Ints
+    force: Array
+    final: Array
+    viscosity: float
+    time: float
+    damage: Array
+    lagging: Array
+    by_time: bool = True
+    start: float = float("nan")
+
+    @classmethod
+    def begin(
+        cls,
+        model: CondensedModel,
+        p: int,
+        nodes: Ints,
+        energy: Array,
+        viscosity: float,
+        time: float,
+    ) -> ViscousSoftening:
+        """Note the bond forces of nodes that are about to soften.
+
+        Args:
+            model: The model.
+            p: Number of the pair.
+            nodes: Slave nodes, shape (n,).
+            energy: Energy each of them is to dissipate without viscosity, shape (n,).
+            viscosity: mu, time.
+            time: Present time.
+        """
+        force = bond_forces_of(model, p, nodes)
+        size = np.maximum(np.linalg.norm(force, axis=1), np.finfo(float).tiny)
+        zero = np.zeros(len(nodes))
+        return cls(p, nodes, force, 2.0 * energy / size, viscosity, time, zero, zero.copy())
+
+    def fraction(self, now: float) -> Array:
+        """Remaining fractions at the end of an increment, shape (n,)."""
+        dt = max(now - self.time, 0.0)
+        lagging = (dt * self.damage + self.viscosity * self.lagging) / (dt + self.viscosity)
+        return np.asarray(1.0 - lagging)
+
+    def damage_at(self, model: CondensedModel, jump: Array) -> Array:
+        """D of a state, shape (n,): of the largest opening along the force at debonding."""
+        index = model.index[self.p][self.nodes]
+        at = np.where(index >= 0, jump[np.maximum(index, 0)], 0.0)
+        size = np.maximum(np.linalg.norm(self.force, axis=1), np.finfo(float).tiny)
+        opening = -(self.force * at).sum(axis=1) / size
+        return np.asarray(np.maximum(self.damage, np.clip(opening / self.final, 0.0, 1.0)))
+
+    def fracture_energy(self, model: CondensedModel, jump: Array) -> float:
+        """What the law without viscosity has spent up to a state, force times length."""
+        left = 1.0 - self.damage_at(model, jump)
+        whole = 0.5 * np.linalg.norm(self.force, axis=1) * self.final
+        return float(whole @ (1.0 - left**2))
+
+    def accept(self, time: float, model: CondensedModel) -> None:
+        """Go on from the end of an accepted increment."""
+        self.lagging = 1.0 - self.fraction(time)
+        self.damage, self.time = self.damage_at(model, model.state.jump), time
+
+    def breaks(self) -> tuple[float, ...]:
+        """None: the force is known at increments only."""
+        return ()
+
+    def now(self, time: float, increment: int) -> float:
+        """What drives it: the time."""
+        return time
+
+
+Letting = TimedRelease | ViscousRelease | ViscousSoftening
+"""Bonds whose force is given while they let go."""
+
+_SPENT = 1e-12
+"""Bonds of which less than this fraction of the force is left are free."""
+
+
+def still_pulling(ramps: Sequence[Letting], time: float, increment: int) -> list[Letting]:
+    """Those of some bonds that still carry a force."""
+    return [r for r in ramps if np.any(np.abs(r.fraction(r.now(time, increment))) > _SPENT)]
 
 
 def bond_forces_of(model: CondensedModel, p: int, nodes: Ints) -> Array:
@@ -126,5 +224,6 @@ def given_forces(
     for ramp in ramps:
         components = model.index[ramp.p][ramp.nodes]
         inside = components >= 0
-        force[components[inside]] = ramp.fraction(ramp.now(time, increment)) * ramp.force[inside]
+        left = np.reshape(ramp.fraction(ramp.now(time, increment)), (-1, 1)) * ramp.force
+        force[components[inside]] = left[inside]
     return force

@@ -23,7 +23,6 @@ from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
 from fxcrack.steps.letting_go import (
     TimedRelease,
-    ViscousRelease,
 )
 
 Array = npt.NDArray[np.float64]
@@ -74,7 +73,14 @@ class March(Account):
                     f"stepping='{self.step.stepping}' does not have; use stepping='increment', "
                     "or a ramp with the opening (no number of increments)"
                 )
-            if getattr(g.criterion, "viscosity", 0.0) > 0.0 and self.step.stepping != "increment":
+            viscosity = getattr(g.criterion, "viscosity", 0.0)
+            if viscosity > 0.0 and isinstance(law, Ramp) and law.increments:
+                raise InputError(
+                    f"interface '{g.title}': viscosity delays a release at once or with the "
+                    f"opening, not one over {law.increments} increments; use viscosity=0 or "
+                    "another release"
+                )
+            if viscosity > 0.0 and self.step.stepping != "increment":
                 raise InputError(
                     f"interface '{g.title}': viscosity acts over increments of time, which "
                     f"stepping='{self.step.stepping}' does not have; use stepping='increment' "
@@ -184,8 +190,8 @@ class March(Account):
             self._values = values
             self.model.accept()
             for ramp in self._ramps:
-                if isinstance(ramp, ViscousRelease):
-                    ramp.accept(self.time)
+                if not isinstance(ramp, TimedRelease):
+                    ramp.accept(self.time, self.model)
             self._record("increment")
             if not any(met):
                 control.accepted()
