@@ -240,7 +240,7 @@ def test_a_body_that_slides_away_is_an_error_in_words():
         block, np.array([-1.0, 0.2]), np.zeros((1, 1)), free_states(1, 2), np.zeros((1, 2))
     )
     assert inside.states.status[0] == STICK
-    with pytest.raises(ConvergenceError, match="friction alone should hold slides"):
+    with pytest.raises(ConvergenceError, match="friction alone should hold a body it slides"):
         backward_euler(
             block, np.array([-1.0, 0.4]), np.zeros((1, 1)), free_states(1, 2), np.zeros((1, 2))
         )

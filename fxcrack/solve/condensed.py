@@ -159,6 +159,10 @@ class CondensedModel:
         if hasattr(self, "system"):
             self.system.soft.bonds, self.system.soft.finished = bonds, finished
 
+    def take_over_friction(self, memory: FrictionMemory, energy: float) -> None:
+        """Go on with states of friction in the next window, and the energy it has taken."""
+        self._rubbed, self.friction_energy = memory, energy
+
     def _remember(self) -> None:
         """Keep what the states of the interface depend on while the window changes."""
         self._soft, self._taken = self.system.soft.bonds, self.system.soft.finished

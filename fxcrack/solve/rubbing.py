@@ -5,8 +5,10 @@ The states belong to slave nodes of pairs; the window numbers them anew at every
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -58,7 +60,7 @@ class FrictionMemory:
             friction.error,
         )
 
-    def state_dict(self) -> dict[str, Array | Ints]:
+    def state_dict(self) -> dict[str, npt.NDArray[Any]]:
         """Plain arrays, for :meth:`from_state_dict`."""
         return {
             "where": self.where,
@@ -69,7 +71,7 @@ class FrictionMemory:
         }
 
     @classmethod
-    def from_state_dict(cls, state: dict[str, Array | Ints]) -> FrictionMemory:
+    def from_state_dict(cls, state: Mapping[str, npt.NDArray[Any]]) -> FrictionMemory:
         """The memory that :meth:`state_dict` was made of."""
         return cls(
             np.asarray(state["where"], dtype=np.int64),

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from fxcrack.errors import InputError
 from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.rubbing import FrictionMemory
 from fxcrack.solve.softening import SoftBond
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +27,8 @@ def take_states(model: CondensedModel) -> Arrays:
 
     Returns:
         loads, shape (n_loads,); per pair p bonded[p], shape (n_nodes,), and jump[p] and what
-        :meth:`JumpSystem.state_dict` holds, shape (n_nodes, gdim); soft.* per softening bond.
+        :meth:`JumpSystem.state_dict` holds, shape (n_nodes, gdim); soft.* per softening bond;
+        friction.* per contact node if there is friction.
     """
     out: Arrays = {"loads": model.state.loads}
     fields = {"jump": model.state.jump, **model.system.state_dict()}
@@ -34,6 +36,10 @@ def take_states(model: CondensedModel) -> Arrays:
         out[f"bonded[{p}]"] = front.bonded
         for name, values in fields.items():
             out[f"{name}[{p}]"] = np.where(index >= 0, values[np.maximum(index, 0)], 0.0)
+    if model.system.friction is not None:
+        memory = FrictionMemory.of(model.system.friction, model.state)
+        out |= {f"friction.{name}": values for name, values in memory.state_dict().items()}
+        out["friction.energy"] = np.array(model.friction_energy)
     return out | _take_bonds(model)
 
 
@@ -75,6 +81,11 @@ def give_bonds(model: CondensedModel, arrays: Arrays) -> None:
             )
         )  # fmt: skip
     model.take_over(bonds, float(arrays["soft.finished"]))
+    if "friction.where" in arrays:
+        memory = FrictionMemory.from_state_dict(
+            {name.split(".")[1]: v for name, v in arrays.items() if name.startswith("friction.")}
+        )
+        model.take_over_friction(memory, float(arrays["friction.energy"]))
 
 
 def give_equilibrium(model: CondensedModel, arrays: Arrays, force: Array) -> None:
@@ -97,7 +108,10 @@ def give_equilibrium(model: CondensedModel, arrays: Arrays, force: Array) -> Non
         for name, values in states.items():
             values[index[inside]] = arrays[f"{name}[{p}]"][inside]
     system.load_state_dict(states)
-    model.state = system.linear(loads, force)
+    if system.friction is None:
+        model.state = system.linear(loads, force)
+    else:
+        model.state = system.equilibrium(loads, force)
     known = saved != 0.0
     size = np.abs(saved).max(initial=0.0)
     off = float(np.abs(model.state.jump - saved)[known].max(initial=0.0))
