@@ -185,8 +185,8 @@ def _line(
 
 
 def test_the_reference_is_the_limit_of_the_best_line_and_the_others_say_how_good_it_is() -> None:
-    runs = _line(Setting(size=1.0), 10.0, 1.0, 1.0)
-    runs += _line(Setting(size=1.0, order=2), 10.01, 0.1, 2.0)
+    runs = _line(Setting(size=1.0), 10.0, 0.06, 1.0)  # 0.015 from its limit
+    runs += _line(Setting(size=1.0, order=2), 10.01, 0.1, 2.0)  # 0.00625 from its limit
     runs += _line(Setting(size=1.0, stepping="increment"), 12.0, 0.0, 1.0)
     known = own_reference(runs, "event")
     assert known is not None
@@ -194,6 +194,16 @@ def test_the_reference_is_the_limit_of_the_best_line_and_the_others_say_how_good
     assert known.uncertainty["load"] == pytest.approx(0.01 / 10.01)
     assert "2nd-order quad" in known.source
     assert known.errors({"load": 10.51})["load"] == pytest.approx(0.5 / 10.01)
+
+
+def test_lines_far_from_their_limit_do_not_speak_for_the_reference() -> None:
+    runs = _line(Setting(size=1.0, cell="triangle"), 11.0, 4.0, 1.0)
+    runs += _line(Setting(size=1.0), 10.0, 0.1, 2.0)
+    known = own_reference(runs, "event")
+    assert known is not None
+    assert known.values["load"] == pytest.approx(10.0)
+    # nobody else comes near: the correction itself says how well it is known
+    assert known.uncertainty["load"] == pytest.approx(0.1 / 16.0 / 10.0)
 
 
 def test_an_exact_closed_form_is_preferred_and_beam_theory_is_not() -> None:
