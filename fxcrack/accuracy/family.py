@@ -13,6 +13,13 @@ from fxcrack.accuracy.study import Setting, Study
 from fxcrack.errors import InputError
 
 
+def _solvers() -> tuple[str, ...]:
+    """Ways to condense that this version has."""
+    from fxcrack.solve import condensed
+
+    return getattr(condensed, "METHODS", ("auto", "schur", "columns"))
+
+
 def settings(study: Study) -> list[Setting]:
     """Settings of a study, each once, from coarse to fine within a line.
 
@@ -47,7 +54,7 @@ def settings(study: Study) -> list[Setting]:
             other = replace(base, stepping=stepping, tolerance=tolerance)
             out += [replace(other, size=h) for h in middle]
     for order in study.orders:
-        for solver in study.solvers[1:]:
+        for solver in (s for s in study.solvers[1:] if s in _solvers()):
             out += [replace(base, order=order, solver=solver, size=h) for h in fine]
         for ranks in study.ranks[1:]:
             out += [replace(base, order=order, ranks=ranks, size=h) for h in fine]

@@ -57,7 +57,7 @@ def _elements(height: float, size: float) -> int:
     sizes=(1.0, 0.5, 0.25, 0.125, 0.0625),
     steppings=("event", "increment"),
     tolerances=(0.2, 0.05, 0.01),
-    solvers=("auto", "columns"),
+    solvers=("auto", "columns", "iterative"),
     ranks=(1, 2),
     title="DCB of carbon fibre, plane strain, growth from 30 to 42 mm",
     unit="mm",

@@ -161,6 +161,8 @@ def main() -> None:
     os.dup2(2, 1)  # whatever libraries print must not mix with the answers
     parent = os.getppid()
     study = load(sys.argv[1])
+    gc.collect()
+    gc.freeze()  # collections between runs need not visit what the imports made
     if comm.rank == 0:
         print(MARK + json.dumps({"ready": fxcrack.__version__}), file=answers, flush=True)
     while (request := _next(comm, parent)) is not None:
