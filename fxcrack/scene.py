@@ -77,6 +77,7 @@ class Scene:
         path: str | None = None,
         newton: NewtonOptions | None = None,
     ) -> None:
+        self.parts = {k: v for k, v in locals().items() if k not in ("self", "mesh")}
         interfaces = [d.interface for d in debonds] + list(bonds)
         titles = [i.title for i in interfaces]
         for title in titles:
@@ -86,11 +87,6 @@ class Scene:
                     "different names to different interfaces"
                 )
         self.mesh = mesh
-        self.parts: dict[str, Any] = {
-            "materials": materials, "model": model, "supports": supports, "loads": loads,
-            "debonds": debonds, "bonds": bonds, "monitors": monitors, "order": order,
-            "options": options,
-        }  # fmt: skip
         self.debonds = list(debonds)
         self.continuum = Continuum(mesh, materials, model, order=order)
         self.pairs = [make_pair(self.continuum, i) for i in interfaces]

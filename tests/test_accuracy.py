@@ -98,7 +98,7 @@ def test_nothing_hangs_and_a_failure_does_not_end_the_study(own: str) -> None:
             with pytest.raises(SettingFailed, match="ZeroDivisionError: by design"):
                 workers.run(replace(setting, ranks=ranks), 30.0)
     with pytest.raises(InputError, match=r"no setting gave a result.*ZeroDivisionError"):
-        run(f"{own}:wrong", budget=10.0, sizes=(2.0,))
+        run(f"{own}:wrong", budget=40.0, sizes=(2.0,))
 
 
 def test_names_that_name_nothing_are_refused(own: str, tmp_path: Path) -> None:

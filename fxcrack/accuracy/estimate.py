@@ -158,9 +158,9 @@ def estimate_errors(scene: Scene, step: Static | Cycles, grow: Sequence[Debond])
     try:
         twin = type(scene)(scene.mesh, **{**scene.parts, "order": 3 - order})
         try:
-            short = _to_onset(step)
+            short = _to_onset(step, linear=scene.plan.path == "condensed")
             twin.run(short, grow=grow, progress=False)
-            theirs, _, _ = _first(twin.history, grow, cycles=cycles)
+            theirs, _, other = _first(twin.history, grow, cycles=cycles)
             size = _size(twin, name)
         finally:
             twin.close()
@@ -170,7 +170,8 @@ def estimate_errors(scene: Scene, step: Static | Cycles, grow: Sequence[Debond])
             f"{3 - order} on the same mesh ({error}). Compare with a finer mesh instead: fxcrack "
             "accuracy does so for any scene function. The run is kept in scene.history"
         ) from error
-    load, rate = _differences(ours, theirs, name, degree, excess, cycles=cycles)
+    scale = ((1.0 + other) / (1.0 + excess)) ** (1.0 / degree)  # both at f = 1
+    load, rate = _differences(ours, theirs, name, degree, scale, cycles=cycles)
     more = _MORE if order == 1 else 1.0
     life = None
     if cycles:
@@ -188,12 +189,13 @@ def estimate_errors(scene: Scene, step: Static | Cycles, grow: Sequence[Debond])
     )
 
 
-def _to_onset(step: Static | Cycles) -> Static | Cycles:
-    """The step as far as the first growth."""
+def _to_onset(step: Static | Cycles, *, linear: bool) -> Static | Cycles:
+    """The step as far as the first growth; to f = 1 exactly where the bodies are linear."""
     if isinstance(step, Cycles):
         return replace(step, until=(), n_max=1.0)
-    stepping = "path" if step.stepping == "path" else "event"
-    return Static(Releases(1), stepping=stepping)
+    if not linear:
+        return replace(step, until=Releases(1))
+    return Static(Releases(1), stepping="path" if step.stepping == "path" else "event")
 
 
 def _size(scene: Scene, name: str) -> float:
@@ -229,10 +231,9 @@ def _largest(history: History, name: str) -> float:
 
 
 def _differences(
-    ours: Row, theirs: Row, name: str, degree: int, excess: float, *, cycles: bool
+    ours: Row, theirs: Row, name: str, degree: int, scale: float, *, cycles: bool
 ) -> tuple[float, float]:
     """Relative differences of the load and of G at given loads or openings."""
-    scale = (1.0 + excess) ** (-1.0 / degree)  # back to f = 1, for a proportional load
     moving = [k[2:-1] for k in ours if k.startswith("u[")]
     loads = [f"R[{k}]" for k in moving] + [k for k in ours if k.startswith("F[")]
     drivers = [f"u[{k}]" for k in moving] + [k for k in ours if k.startswith("F[")]

@@ -1,8 +1,8 @@
 """Which settings of a study are run: not all combinations, but every choice beside the base.
 
 Each cell shape and order is run with the base way to find G, each other way to find G with the base
-cell; increments, solvers and ranks with the base cell and way alone, where they can tell something:
-increments on the second and third coarsest size, solvers and ranks on the two finest.
+cell. Increments and solvers are run with the base of all else on the second and third coarsest
+size, ranks with the base cell and way on the two finest: where they can tell something.
 """
 
 from __future__ import annotations
@@ -11,13 +11,6 @@ from dataclasses import replace
 
 from fxcrack.accuracy.study import Setting, Study
 from fxcrack.errors import InputError
-
-
-def _solvers() -> tuple[str, ...]:
-    """Ways to condense that this version has."""
-    from fxcrack.solve import condensed
-
-    return getattr(condensed, "METHODS", ("auto", "schur", "columns"))
 
 
 def settings(study: Study) -> list[Setting]:
@@ -53,9 +46,9 @@ def settings(study: Study) -> list[Setting]:
         for tolerance in tolerances or (None,):
             other = replace(base, stepping=stepping, tolerance=tolerance)
             out += [replace(other, size=h) for h in middle]
+    for solver in study.solvers[1:]:
+        out += [replace(base, solver=solver, size=h) for h in middle]
     for order in study.orders:
-        for solver in (s for s in study.solvers[1:] if s in _solvers()):
-            out += [replace(base, order=order, solver=solver, size=h) for h in fine]
         for ranks in study.ranks[1:]:
             out += [replace(base, order=order, ranks=ranks, size=h) for h in fine]
     admitted = [s for s in dict.fromkeys(out) if study.admits is None or study.admits(s)]

@@ -1,7 +1,8 @@
 """Runs settings in processes of their own, under time limits: whatever they do, nothing hangs.
 
 A worker serves all settings with the same number of ranks, so that Python starts once for them. One
-that fails, dies or takes too long is ended with all its ranks, and the next setting gets a new one.
+that dies, takes too long or fails on one of several ranks is ended with all its ranks, and the next
+setting gets a new one.
 """
 
 from __future__ import annotations
@@ -30,6 +31,10 @@ START_LIMIT = 60.0
 
 class SettingFailed(FxcrackError):
     """A setting gave no result; the message says why."""
+
+
+class Refused(SettingFailed):
+    """It raised an error, and its process is ready for the next one."""
 
 
 class TookTooLong(SettingFailed):
@@ -71,7 +76,7 @@ class _Worker:
             raise SettingFailed(f"the worker is gone: {self._last_words()}") from error
         answer = self._answer(limit)
         if "error" in answer:
-            raise SettingFailed(str(answer["error"]))
+            raise Refused(str(answer["error"]))
         result: dict[str, Any] = answer["result"]
         return result
 
@@ -157,7 +162,7 @@ class Workers:
         """Run a setting within a time limit (seconds); see :func:`fxcrack.accuracy.worker.run`.
 
         Raises:
-            SettingFailed: It gave no result; its process is gone.
+            SettingFailed: It gave no result.
         """
         ranks = setting.ranks
         begin = time.monotonic()
@@ -176,8 +181,9 @@ class Workers:
             if ranks not in self._running:
                 self._running[ranks] = _Worker(self._scene, ranks, min(limit, START_LIMIT))
             return self._running[ranks].ask(setting, limit)
-        except SettingFailed:
-            self._drop(ranks)
+        except SettingFailed as error:
+            if ranks > 1 or not isinstance(error, Refused):
+                self._drop(ranks)
             raise
 
     def _drop(self, ranks: int) -> None:

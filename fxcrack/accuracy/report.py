@@ -22,11 +22,11 @@ FILES = ("accuracy.json", "accuracy.md", "error.png", "cost.png")
 _PHASES = {
     "set up": ("setup",),
     "K, T": ("assemble", "transform"),
-    "factor": ("factor",),
+    "factor": ("factor", "multigrid", "columns"),
     "growth": ("march",),
 }
 _HEADINGS = ("setting", "size", "dofs", "seconds", *_PHASES, "MB")
-_WIDTH = 128  # characters of the table where the terminal is not at least as wide
+_WIDTH = 136  # characters of the table where the terminal is not at least as wide
 
 
 def write(result: Result, out: Path) -> list[Path]:
