@@ -19,6 +19,7 @@ from fxcrack.criteria import (
     Tabulated,
 )
 from fxcrack.criteria import Ramp as OpeningRamp
+from fxcrack.effects import FiniteStrain
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.inertia import Inertia
 from fxcrack.interface.pairing import Interface
@@ -45,8 +46,9 @@ from fxcrack.output.history import History
 from fxcrack.output.report import tip_table, write_tip_table
 from fxcrack.scene import Debond, Scene
 from fxcrack.solve.condensed import CondensedOptions
+from fxcrack.solve.newton import NewtonOptions
 from fxcrack.steps.fatigue import Cycles
-from fxcrack.steps.static import Static
+from fxcrack.steps.static import Dynamic, Static
 from fxcrack.steps.until import CrackLength, Releases, Time
 from fxcrack.temperature import ByTemperature, Temperature
 
@@ -72,9 +74,11 @@ __all__ = [
     "Cycles",
     "Debond",
     "Displacement",
+    "Dynamic",
     "EnhancedVCCT",
     "Fatigue",
     "FieldSeries",
+    "FiniteStrain",
     "FxcrackError",
     "History",
     "Inertia",
@@ -85,6 +89,7 @@ __all__ = [
     "Mesh",
     "Monitor",
     "NeoHookean",
+    "NewtonOptions",
     "OpeningRamp",
     "Orthotropic",
     "Paris",

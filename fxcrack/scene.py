@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fxcrack import log
 from fxcrack.accuracy.estimate import as_details, check_accuracy, demand
 from fxcrack.continuum import Continuum
-from fxcrack.effects import Effect, form_terms, plan
+from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
@@ -51,7 +51,8 @@ class Scene:
         monitors: Displacements to watch.
         order: Order of the displacement; that of the mesh by default.
         options: How the continuum is condensed.
-        effects: What the bodies do beyond small linear elasticity.
+        effects: What the bodies do beyond small linear elasticity: :class:`FiniteStrain`,
+            :class:`Temperature`, :class:`Inertia`.
         path: "newton" sends a scene without such effects through the nonlinear solver all the
             same; by default the effects decide.
         newton: Controls of the nonlinear solver, where it is used.
@@ -73,7 +74,7 @@ class Scene:
         monitors: Sequence[Monitor] = (),
         order: int | None = None,
         options: CondensedOptions | None = None,
-        effects: Sequence[Effect] = (),
+        effects: Sequence[Any] = (),
         path: str | None = None,
         newton: NewtonOptions | None = None,
     ) -> None:
@@ -88,13 +89,15 @@ class Scene:
                 )
         self.mesh = mesh
         self.debonds = list(debonds)
-        self.continuum = Continuum(mesh, materials, model, order=order)
+        self.effects = list(effects)
+        self.continuum = Continuum(
+            mesh, materials, model, order=order, temperature=temperature_of(self.effects)
+        )
         self.pairs = [make_pair(self.continuum, i) for i in interfaces]
         check_friction(self.debonds, self.pairs)
         self.supports = collect_supports(self.continuum, list(supports))
-        self.loads = list(loads)
-        self.effects = list(effects)
-        self.plan = plan(self.effects, path)
+        self.plan = plan(self.continuum, self.effects, loads, interfaces, path)
+        self.loads = dead_loads(self.continuum, loads, self.plan.path)
         parts = self.continuum, self.pairs, self.supports, self.loads, list(monitors)
         self.model: CondensedModel
         if self.plan.path == "condensed":
@@ -103,10 +106,11 @@ class Scene:
             from fxcrack.solve.newton_model import NewtonModel  # only scenes that need it pay
             from fxcrack.terms.bodies import Bodies
 
+            terms = form_terms(self.continuum, self.effects, loads)
             self.model = NewtonModel(
                 *parts,
                 options or CondensedOptions(rows=0.0),
-                bodies=Bodies(self.continuum, form_terms(self.continuum, self.effects)),
+                bodies=Bodies(self.continuum, terms),
                 newton=newton or NewtonOptions(),
             )
         self.growths: list[Growth] = []
@@ -200,9 +204,6 @@ class Scene:
             for pair, held in zip(self.pairs, self.model.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
             self.model.start()
-            at_start = self.loads_at(0.0)
-            if np.any(at_start):
-                self._jump_to(at_start)
             self._started = True
         else:
             # another window: the same equilibrium in its components
@@ -285,12 +286,6 @@ class Scene:
             carried["fatigue"] = self.fatigue
             return CycleMarch(self.model, growths, step, *common, **carried)
         return March(self.model, growths, step, *common, **carried)
-
-    def _jump_to(self, loads: Array) -> None:
-        """Apply loads that are there from the first moment."""
-        raise InputError(
-            f"loads are not zero at time 0 (amplitudes {loads}); let amplitudes start at 0"
-        )
 
     def _reach(self, step: Static | Cycles) -> list[float]:
         """How far each crack may grow in a step, length."""

@@ -31,7 +31,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, SolverError
 from fxcrack.terms.bodies import Bodies
 from fxcrack.terms.elastic import Elastic
-from fxcrack.terms.inertia import REMEMBERED, InertiaTerm
+from fxcrack.terms.inertia import REMEMBERED, InertiaForces
 
 pytestmark = pytest.mark.mpi
 
@@ -62,7 +62,7 @@ def moving(
     material = fx.Isotropic(E, nu, density=RHO)
     continuum = Continuum(box(comm, model, n=n), material, MODELS[model], order=order)
     elastic = Elastic(continuum, finite=finite)
-    return Bodies(continuum, [elastic, InertiaTerm(continuum, effect)])
+    return Bodies(continuum, [elastic, InertiaForces(continuum, effect)])
 
 
 def with_velocity(effect: fx.Inertia, size: float = 0.01) -> fx.Inertia:
@@ -231,7 +231,7 @@ def test_mass(comm: MPI.Intracomm, model: str, lumped: bool) -> None:
     """A rigid acceleration needs the mass times it; lumped mass is diagonal."""
     effect = fx.Inertia(rho_inf=1.0, density=3.0, lumped=lumped)
     continuum = Continuum(box(comm, model), fx.Isotropic(E, 0.3), MODELS[model])
-    bodies = Bodies(continuum, [InertiaTerm(continuum, effect)])
+    bodies = Bodies(continuum, [InertiaForces(continuum, effect)])
     bodies.begin(0.1, 0.1)
     u = np.zeros(continuum.n_local)
     u[1 :: continuum.gdim] = 1.0
@@ -261,8 +261,8 @@ def test_tangent_is_assembled_once_per_length_of_the_increment(comm: MPI.Intraco
     assert seen[0] == seen[1] and seen[2] == seen[3]
     assert seen[0][0] != seen[2][0] and seen[0][1] < seen[2][1]
     assert bodies.n_forms == 4  # residual, tangent, strain and kinetic energy
-    with pytest.raises(SolverError, match=r"cannot have the length -0\.1"):
-        bodies.begin(0.0, -0.1)
+    with pytest.raises(SolverError, match="must be > 0"):
+        bodies.begin(0.0, 0.0)
     bodies.destroy()
 
 
@@ -278,48 +278,6 @@ def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     norms = solve(bodies, BAR)
     assert newton_order(norms) > 1.7, norms
     bodies.destroy()
-
-
-def test_a_release_at_the_end_of_an_increment_is_solved_in_it(comm: MPI.Intracomm) -> None:
-    """A tip held and let go with dt = 0 moves as if it had been free in the whole increment."""
-    ends = []
-    for held_first in (False, True):
-        bodies = moving(comm, with_velocity(fx.Inertia()))
-        bodies.begin(0.0, 0.0)  # before any increment the bodies are at rest: nothing happens
-        solve(bodies, [*BAR])
-        bodies.commit()
-        first = bodies.stored()["kinetic_energy"]
-        march(bodies, 0.05, 3)
-        work = 0.0
-        bodies.begin(0.2, 0.05)
-        if held_first:
-            c = bodies.continuum
-            before = bodies.u.x.array[: c.n_local].copy()
-            # somebody holds the tip where it was
-            solve(
-                bodies,
-                [*BAR, ("x1", 0)],
-                values=lambda x, u=before: np.where(x[:, :1] > L - 1e-9, u.reshape(-1, 2), 0.0),
-            )
-            middle = bodies.u.x.array[: c.n_local].copy()
-            force = internal(bodies, middle)
-            bodies.commit()
-            bodies.begin(0.2, 0.0)
-            solve(bodies, BAR)
-            after = bodies.u.x.array[: c.n_local].copy()
-            tip = np.zeros(c.n_local)
-            tip[held_dofs(c, [("x1", 0)])] = 1.0
-            # the holder's force falls to nothing on the way; it did no work before
-            work = 0.5 * dot(c, force * tip, after - middle)
-        else:
-            solve(bodies, BAR)
-        bodies.commit()
-        total = sum(bodies.stored().values()) + sum(bodies.spent().values())
-        assert total - work == pytest.approx(first, rel=1e-9)
-        march(bodies, 0.05, 2)
-        ends.append(bodies.u.x.array.copy())
-        bodies.destroy()
-    assert ends[0] == pytest.approx(ends[1], abs=1e-11 * 0.01)
 
 
 def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
@@ -346,11 +304,11 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
 def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
     continuum = Continuum(box(comm, "solid"), fx.Isotropic(E, 0.3), fx.Solid(), order=2)
     for message, make in (
-        ("has no density", lambda: InertiaTerm(continuum, fx.Inertia())),
-        ("first-order bodies", lambda: InertiaTerm(continuum, fx.Inertia(1.0, lumped=True))),
+        ("has no density", lambda: InertiaForces(continuum, fx.Inertia())),
+        ("first-order bodies", lambda: InertiaForces(continuum, fx.Inertia(1.0, lumped=True))),
         (
             "velocity has 2 components, 3 needed",
-            lambda: InertiaTerm(continuum, fx.Inertia(1.0, velocity=(0.0, 1.0))),
+            lambda: InertiaForces(continuum, fx.Inertia(1.0, velocity=(0.0, 1.0))),
         ),
         ("density = 0.0 must be positive", lambda: fx.Inertia(0.0)),
         ("rho_inf = 1.2", lambda: fx.Inertia(rho_inf=1.2)),

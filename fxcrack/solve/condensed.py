@@ -119,6 +119,9 @@ class CondensedModel:
         self.reach = [np.inf] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
+        # temperature patterns come last among the loads
+        self._n_thermal = sum(type(x).__name__ == "ThermalLoad" for x in loads)
+        self._held: Array | None = None
         self.keep: list[tuple[int, int]] = []
         self._followed: list[Ints] = []
         self._soft: list[SoftBond] = []
@@ -555,9 +558,31 @@ class CondensedModel:
         work = work_between(here, point, len(self.loads))
         return work, bond_work(here, point), 0.5 * (here.jump + point.jump)
 
-    def strain_energy(self, state: Equilibrium) -> float:
-        """Energy stored in the bodies."""
-        return self.system.strain_energy(state)
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies, by name; collective."""
+        return {"strain_energy": self.system.strain_energy(state) + self._thermal_part(state)}
+
+    def spent(self) -> dict[str, float]:
+        """Energies the bodies have turned into something else, by name; linear ones none."""
+        return {}
+
+    def extra_work(self, state: Equilibrium) -> float:
+        """Work on the bodies beyond that of supports and force patterns: of a temperature."""
+        return self._thermal_part(state)
+
+    def _thermal_part(self, state: Equilibrium) -> float:
+        """What a temperature, which counts as a load here, adds to work and stored energy alike.
+
+        -sum_k a_k f_k u + 1/2 sum_kl a_k a_l E_kl  (:func:`fxcrack.thermal.held_energies`)
+        """
+        if not self._n_thermal:
+            return 0.0
+        if self._held is None:
+            from fxcrack.thermal import held_energies
+
+            self._held = held_energies(self.continuum)
+        factors, answers = state.loads[-self._n_thermal :], state.conjugate[-self._n_thermal :]
+        return float(0.5 * factors @ self._held @ factors - factors @ answers)
 
     def rub(self, here: Equilibrium, point: Equilibrium) -> None:
         """Account for the energy friction takes along a linear piece."""

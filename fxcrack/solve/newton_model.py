@@ -119,6 +119,8 @@ class NewtonModel(CondensedModel):
         self._stiff = 0.0
         self._base = np.zeros(0)
         self._moved = False  # whether the tangent is that of a trial
+        self._version: tuple[int, ...] = ()  # of the terms whose tangent is factored
+        self._begun = False  # whether the last trial was an increment of time for the terms
         self._current = bodies.finite
         self._masters = [
             gather_surface(continuum, p.interface.master)
@@ -192,6 +194,7 @@ class NewtonModel(CondensedModel):
         )
         if matrix is not self._stiffness:
             matrix.destroy()
+        self._version = self.bodies.version
         self._stiff = float(self._stiffness.norm(PETSc.NormType.NORM_INFINITY))
 
     def _anchor(self, residual: PETSc.Vec, jump: Array, loads: Array) -> PETSc.Vec:
@@ -289,7 +292,7 @@ class NewtonModel(CondensedModel):
 
         ``out`` becomes A_11^-1 r_1.
         """
-        if not self.bodies.constant:
+        if not self.bodies.constant or self._version != self.bodies.version:
             self._factor()
             self._moved = True
         q = self._anchor(residual, jump, loads)
@@ -340,10 +343,13 @@ class NewtonModel(CondensedModel):
         here = self.state
         saved = self.system.snapshot()
         self.at = at
-        self.bodies.begin(at, dt)
+        dynamic = self.bodies.dynamic
+        self._begun = dt > 0.0 or not dynamic
+        if self._begun:
+            self.bodies.begin(at, dt)
         start = time.perf_counter()
         points = [(0.0, here)]
-        if follow:
+        if follow and not dynamic:
             points += self.system.pieces(here, loads, force)
         else:
             points.append((1.0, self.system.equilibrium(loads, force)))
@@ -373,6 +379,9 @@ class NewtonModel(CondensedModel):
             y.destroy()
         self.counts.solves += 1
         self.counts.iterations += iterations
+        if dynamic or self.bodies.path_dependent:
+            # their terms count by the trapezoidal rule: with the same rule here nothing is lost
+            points, predicted, iterations = [(0.0, here), (1.0, end)], end, 0
         after = self.system.rates(loads - here.loads, force - here.force) if iterations else rate
         jump = (end.jump - predicted.jump) / 2.0 - (after[0] - rate[0]) / 12.0
         conjugate = (end.conjugate - predicted.conjugate) / 2.0 - (after[1] - rate[1]) / 12.0
@@ -426,7 +435,8 @@ class NewtonModel(CondensedModel):
         self._moved = False
         self.state = self.last_move.end
         self._base = self.state.jump.copy()
-        self.bodies.commit()
+        if self._begun:
+            self.bodies.commit()
 
     def reject(self, saved: Any) -> None:
         """Forget the last trial; collective.
@@ -462,6 +472,8 @@ class NewtonModel(CondensedModel):
             ConvergenceError: No equilibrium without these bonds was found.
         """
         self.open(p, nodes)
+        if self.bodies.dynamic:
+            return 0.0, 0.0  # the force goes to zero over the next increment
         energy, work, done, size = 0.0, 0.0, 0.0, 1.0
         begin = self.state.force
         while done < 1.0:
@@ -484,29 +496,49 @@ class NewtonModel(CondensedModel):
 
     def solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_window,)."""
+        if self.bodies.dynamic:
+            force = self.state.force  # nothing happens in no time
         self.move(self.state.loads, force, self.at, 0.0, follow=False)
         self.accept()
 
     def prepare(self, active: list[bool], reach: list[float]) -> None:
         """Build the window for a step, as for a linear continuum."""
+        old = self._numbered()
         super().prepare(active, reach)
-        if hasattr(self, "state"):
-            self._renumber()
+        if old is not None:
+            self._renumber(*old)
 
     def rebase(self) -> None:
         """Another window around the present fronts, at the same displacement; collective."""
+        old = self._numbered()
         super().rebase()
-        self._renumber()
+        assert old is not None
+        self._renumber(*old)
 
-    def _renumber(self) -> None:
-        zero = np.zeros(self.system.n_window)
-        self.state = Equilibrium(self.state.loads, zero, self._base.copy(), self.state.conjugate)
+    def _numbered(self) -> tuple[list[Ints], Equilibrium] | None:
+        """Numbers of the window's components and the state in them, once there is one."""
+        return ([i.copy() for i in self.index], self.state) if hasattr(self, "state") else None
+
+    def _renumber(self, numbers: list[Ints], old: Equilibrium) -> None:
+        force = np.zeros(self.system.n_window)
+        for before, now in zip(numbers, self.index, strict=True):
+            both = (before >= 0) & (now >= 0)
+            force[now[both]] = old.force[before[both]]
+        self.state = Equilibrium(old.loads, force, self._base.copy(), old.conjugate)
 
     # -- energies and fields -------------------------------------------------------------
 
-    def strain_energy(self, state: Equilibrium) -> float:
-        """Energy stored in the bodies in the accepted state; collective."""
-        return sum(self.bodies.stored().values())
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies in the accepted state, by name; collective."""
+        return self.bodies.stored()
+
+    def spent(self) -> dict[str, float]:
+        """Energies the bodies have turned into something else, by name; collective."""
+        return self.bodies.spent()
+
+    def extra_work(self, state: Equilibrium) -> float:
+        """Work of loads that follow the bodies and of a temperature; collective."""
+        return sum(term.work() for term in self.bodies.terms)
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Accepted displacement; the caller destroys it."""

@@ -287,7 +287,8 @@ class Account:
 
     def _record(self, event: str) -> None:
         state, model = self.model.state, self.model
-        energy = model.strain_energy(state)
+        stored, spent = model.stored(state), model.spent()
+        work = self.work + model.extra_work(state)
         row: Row = {"time": self.time, "event": event}
         for (load, answer, moves), a, r in zip(
             self._names, state.loads, state.conjugate, strict=True
@@ -308,8 +309,8 @@ class Account:
                 for name, quantity in v.report.items():
                     row[f"{name}[{g.title}]"] = float(quantity[i])
                 row[f"node[{g.title}]"] = int(v.tips.node[i])
-        row["strain_energy"] = energy
-        row["external_work"] = self.work
+        row |= stored
+        row["external_work"] = work
         row["released_energy"] = self.released - self.viscous
         if self.viscous:
             row["viscous_energy"] = self.viscous
@@ -317,7 +318,9 @@ class Account:
             row["snap_energy"] = self.snapped
         if model.system.friction is not None:
             row["friction_energy"] = model.friction_energy
-        row["balance"] = self.work - energy - self.released - model.friction_energy
+        row |= spent
+        gone = self.released + model.friction_energy + sum(spent.values())
+        row["balance"] = work - sum(stored.values()) - gone
         self.history.append(row)
         if self._observer is not None:
             self._observer(event, row)

@@ -90,6 +90,7 @@ class March(Account):
         before = {k: v for k, v in self.model.timings.seconds.items() if k.startswith("factor")}
         self._look()
         if self._resume is None:
+            self._load_at_once()
             self._record("start")
         try:
             if self.step.stepping == "increment":
@@ -108,6 +109,14 @@ class March(Account):
         inside = sum(after.values()) - sum(before.values())
         self.model.timings.add("march", start + inside)
         return reason
+
+    def _load_at_once(self) -> None:
+        """Apply loads that are there from the first moment of the step, in proportion."""
+        wanted, present = self.loads_at(self.time), self.model.state.loads
+        if np.abs(wanted - present).max(initial=0.0) > 1e-12 * np.abs(wanted).max(initial=0.0):
+            self._follow(self._pieces(self.time), self.time)
+            self.model.accept()
+            self._values = self._evaluate()
 
     def _run_events(self) -> str:
         while True:

@@ -8,7 +8,7 @@ and the secant through both ends gives the next guess.
 from __future__ import annotations
 
 from fxcrack import log
-from fxcrack.errors import ConvergenceError
+from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.newton_model import NewtonModel
 from fxcrack.steps.evaluate import TipValues
@@ -28,6 +28,15 @@ class NewtonMarch(March):
     """
 
     model: NewtonModel
+
+    def run(self) -> str:
+        """March until an end condition holds; returns why the step ended."""
+        if self.model.bodies.dynamic and self.step.stepping != "increment":
+            raise InputError(
+                f"stepping='{self.step.stepping}' looks for equilibria, but Inertia moves the "
+                "bodies in time; use a Dynamic step, or leave Inertia out"
+            )
+        return super().run()
 
     def _walk(self, target: float, *, upward: bool) -> bool:
         """Go towards a time; stop where the largest f crosses 1.

@@ -60,3 +60,27 @@ class Static:
     def ends(self) -> tuple[Until, ...]:
         """End conditions as a tuple."""
         return self.until if isinstance(self.until, tuple) else (self.until,)
+
+
+@dataclass(frozen=True)
+class Dynamic(Static):
+    """A step in real time, for a scene with :class:`fxcrack.Inertia`.
+
+    Increments of the time step; an increment in which f overshoots 1 + tolerance is cut back and
+    the time step grows back afterwards. Bonds that let go lose their force over the next increment.
+
+    Args:
+        dt: Time step, time; sets ``initial`` and ``maximum``.
+    """
+
+    stepping: str = "increment"
+    dt: float = float("nan")
+
+    def __post_init__(self) -> None:
+        """Let the increments be the time step."""
+        if not 0.0 < self.dt < float("inf"):
+            raise InputError(f"Dynamic: dt = {self.dt} must be a positive time")
+        for name, value in (("initial", self.dt), ("maximum", self.dt)):
+            object.__setattr__(self, name, value)
+        object.__setattr__(self, "minimum", min(self.minimum, 1e-6 * self.dt))
+        super().__post_init__()

@@ -29,6 +29,8 @@ class Term:
         version: Counts the changes of a constant tangent by :meth:`begin` (another dt or
             temperature): the same number, the same tangent.
         finite: Whether bodies may turn and stretch by any amount.
+        dynamic: Whether its forces depend on how long an increment takes.
+        path_dependent: Whether its stress depends on how the bodies came here.
         energy_name: What the balance calls its stored energy; terms of one name are summed.
     """
 
@@ -38,6 +40,8 @@ class Term:
     version: int = 0
     energy_name: str = "strain_energy"
     finite: bool = False
+    dynamic: bool = False
+    path_dependent: bool = False
 
     def energy(self, u: fem.Function) -> Any:
         """Stored energy as a UFL form, ``None`` if it stores none."""
@@ -51,15 +55,8 @@ class Term:
         """Change of the residual with u in the direction du; a UFL form."""
         return ufl.derivative(self.residual(u, v), u, du)
 
-    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
-        """Cauchy stress, components of ``model.stress_labels``, and measure of each part; UFL."""
-        return []
-
     def begin(self, time: float, dt: float) -> None:
-        """An increment of dt ends at a time: set what depends on them; collective.
-
-        With dt = 0 the state at the end of the last increment changes: bonds were released.
-        """
+        """An increment of dt ends at a time: set what depends on them; collective."""
 
     def update(self, u: fem.Function) -> None:
         """A new trial u was set: update what lives at quadrature points; collective."""

@@ -35,8 +35,7 @@ class Bodies:
 
     Attributes:
         u: Present (trial) displacement.
-        seconds: Seconds spent assembling and updating, by term (``update``) and in all.
-        n_forms: Number of compiled forms.
+        seconds: Seconds spent on each term, updating and assembling.
     """
 
     def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
@@ -44,8 +43,8 @@ class Bodies:
         self.terms = list(terms)
         self.u = fem.Function(continuum.space, name="displacement")
         self.seconds: dict[str, float] = {}
-        self._residual: Any = None
-        self._tangent: Any = None
+        # one residual and one tangent per term, so that the cost of each can be told
+        self._forms: list[tuple[Term, Any, Any]] = []
         self._energies: dict[str, Any] = {}
         self._matrix: PETSc.Mat | None = None
         self._assembled: tuple[int, ...] | None = None  # version of the terms in the matrix
@@ -53,7 +52,7 @@ class Bodies:
     @property
     def n_forms(self) -> int:
         """Number of compiled forms."""
-        return (2 if self._residual is not None else 0) + len(self._energies)
+        return 2 * len(self._forms) + len(self._energies)
 
     @property
     def symmetric(self) -> bool:
@@ -64,6 +63,16 @@ class Bodies:
     def finite(self) -> bool:
         """Whether bodies may turn and stretch by any amount."""
         return any(t.finite for t in self.terms)
+
+    @property
+    def dynamic(self) -> bool:
+        """Whether forces depend on how long an increment takes."""
+        return any(t.dynamic for t in self.terms)
+
+    @property
+    def path_dependent(self) -> bool:
+        """Whether stresses depend on how the bodies came here."""
+        return any(t.path_dependent for t in self.terms)
 
     @property
     def constant(self) -> bool:
@@ -77,12 +86,13 @@ class Bodies:
 
     def compile(self) -> None:
         """Compile all forms; collective."""
-        if self._residual is not None:
+        if self._forms:
             return
         space = self.continuum.space
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
-        self._residual = fem.form(sum(t.residual(self.u, v) for t in self.terms))
-        self._tangent = fem.form(sum(t.tangent(self.u, v, du) for t in self.terms))
+        for term in self.terms:
+            residual = fem.form(term.residual(self.u, v))
+            self._forms.append((term, residual, fem.form(term.tangent(self.u, v, du))))
         energies: dict[str, Any] = {}
         for term in self.terms:
             energy = term.energy(self.u)
@@ -105,26 +115,36 @@ class Bodies:
 
     def residual(self) -> PETSc.Vec:
         """R(u) on owned dofs; the caller destroys it."""
-        start = time.perf_counter()
         self.compile()
-        vector = compat.create_vector(self._residual)
-        dolfinx.fem.petsc.assemble_vector(vector, self._residual)
+        vector = compat.create_vector(self._forms[0][1])
+        for term, form, _ in self._forms:
+            start = time.perf_counter()
+            dolfinx.fem.petsc.assemble_vector(vector, form)
+            self._add(term.name, start)
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        self._add("residual", start)
         return vector
+
+    def _pattern(self) -> Any:
+        """A form that couples what any term couples: the displacements of each cell."""
+        if len(self._forms) == 1:
+            return self._forms[0][2]
+        space = self.continuum.space
+        v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
+        return fem.form(ufl.inner(du, v) * ufl.dx(self.continuum.mesh.domain))
 
     def tangent(self) -> PETSc.Mat:
         """K(u), kept and reassembled in place; owned by this object."""
-        start = time.perf_counter()
         self.compile()
         if self._matrix is None:
-            self._matrix = dolfinx.fem.petsc.create_matrix(self._tangent)
+            self._matrix = dolfinx.fem.petsc.create_matrix(self._pattern())
         if not (self.constant and self._assembled == self.version):
             self._matrix.zeroEntries()
-            dolfinx.fem.petsc.assemble_matrix(self._matrix, self._tangent)
+            for term, _, form in self._forms:
+                start = time.perf_counter()
+                dolfinx.fem.petsc.assemble_matrix(self._matrix, form)
+                self._add(term.name, start)
             self._matrix.assemble()
             self._assembled = self.version
-        self._add("tangent", start)
         return self._matrix
 
     def stored(self) -> dict[str, float]:
@@ -135,15 +155,6 @@ class Bodies:
             name: float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
             for name, form in self._energies.items()
         }
-
-    def stress(self) -> fem.Function:
-        """Cauchy stress at the present displacement, means over the undeformed cells; collective.
-
-        Components in the order of ``model.stress_labels``.
-        """
-        return self.continuum.cell_means(
-            [part for term in self.terms for part in term.stresses(self.u)]
-        )
 
     def spent(self) -> dict[str, float]:
         """Energies turned into something else so far, by name; collective."""

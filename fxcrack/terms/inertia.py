@@ -7,9 +7,6 @@ With F = f_int - f_ext - p (interface forces p), the balance M a_{n+1-alpha_m} +
     b_{n+1} = (a_{n+1-alpha_m} - alpha_f b_n)/(1 - alpha_f),    c_{n+1} likewise of v_{n+1-alpha_f},
 
 since F_n = -(M b_n + C c_n) is known. Newmark's formulas make b and c linear in u_{n+1}.
-
-Bonds that are released at the end of an increment are released in it: the same increment is solved
-again with the changed interface forces (:meth:`InertiaTerm.begin` with dt = 0).
 """
 
 from __future__ import annotations
@@ -34,7 +31,7 @@ Array = npt.NDArray[np.float64]
 REMEMBERED = ("u", "v", "a", "b", "c")
 
 
-class InertiaTerm(Term):
+class InertiaForces(Term):
     """Inertia and Rayleigh damping of all bodies.
 
     The tangent is a constant while the length of the increments is.
@@ -52,6 +49,7 @@ class InertiaTerm(Term):
 
     name = "inertia"
     constant = True
+    dynamic = True
     energy_name = "kinetic_energy"
 
     def __init__(self, continuum: Continuum, effect: Inertia) -> None:
@@ -81,8 +79,8 @@ class InertiaTerm(Term):
         if effect.velocity is not None and self._damped:
             for name in ("a", "b"):
                 self._last[name] = self._slowing()
-        self._base = self._last  # where the present increment starts
         self._dt = 0.0
+        self._moving = False  # between the beginning of an increment and its commit
         self._spent = {"numerical_dissipation": 0.0}
         if self._damped:
             self._spent["damping_energy"] = 0.0
@@ -147,56 +145,47 @@ class InertiaTerm(Term):
         return total
 
     def begin(self, time: float, dt: float) -> None:
-        """Prepare b(u) and c(u) for an increment.
-
-        Args:
-            time: Its end.
-            dt: Its length; 0 goes on with the last increment (before any, no inertia acts).
-        """
-        if dt < 0.0:
-            raise SolverError(f"inertia: an increment cannot have the length {dt}")
+        """Prepare b(u) and c(u) for an increment."""
+        if not dt > 0.0:
+            raise SolverError(f"inertia: an increment of length {dt} is no motion; it must be > 0")
+        self._moving = True
         alpha_m, alpha_f, beta, gamma = self._effect.parameters
-        keep = 1.0 - alpha_f
-        if dt > 0.0:
-            self._base = self._last
-            if dt != self._dt:
-                self._dt = dt
-                self.version += 1
-                self._b_u.value = (1.0 - alpha_m) / (beta * dt**2 * keep)
-                self._c_u.value = gamma / (beta * dt)
-        if self._dt == 0.0:
-            return
-        base, dt = self._base, self._dt
-        a = self._known_acceleration()
+        last, keep = self._last, 1.0 - alpha_f
+        if dt != self._dt:
+            self._dt = dt
+            self.version += 1
+            self._b_u.value = (1.0 - alpha_m) / (beta * dt**2 * keep)
+            self._c_u.value = gamma / (beta * dt)
+        a = self._known_acceleration(last)
         self._b_known.x.array[:] = (
-            (1.0 - alpha_m) * a + alpha_m * base["a"] - alpha_f * base["b"]
+            (1.0 - alpha_m) * a + alpha_m * last["a"] - alpha_f * last["b"]
         ) / keep
-        v = base["v"] + dt * ((1.0 - gamma) * base["a"] + gamma * a)
-        self._c_known.x.array[:] = v + alpha_f * (base["v"] - base["c"]) / keep
+        v = last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
+        self._c_known.x.array[:] = v + alpha_f * (last["v"] - last["c"]) / keep
 
-    def _known_acceleration(self) -> Array:
+    def _known_acceleration(self, last: dict[str, Array]) -> Array:
         """The part of the new acceleration that is not u/(beta dt^2)."""
-        beta, dt, base = self._effect.parameters[2], self._dt, self._base
-        known = -(base["u"] + dt * base["v"]) / (beta * dt**2)
-        return np.asarray(known - (0.5 / beta - 1.0) * base["a"])
+        beta, dt = self._effect.parameters[2], self._dt
+        known = -(last["u"] + dt * last["v"]) / (beta * dt**2)
+        return np.asarray(known - (0.5 / beta - 1.0) * last["a"])
 
     def _motion(self, u: Array) -> tuple[Array, Array]:
         """Acceleration and velocity at a new displacement."""
         _, _, beta, gamma = self._effect.parameters
-        base, dt = self._base, self._dt
-        a = u / (beta * dt**2) + self._known_acceleration()
-        return a, base["v"] + dt * ((1.0 - gamma) * base["a"] + gamma * a)
+        last, dt = self._last, self._dt
+        a = u / (beta * dt**2) + self._known_acceleration(last)
+        return a, last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
 
     def update(self, u: fem.Function) -> None:
         """Set the trial velocity."""
-        if self._dt > 0.0:
+        if self._moving:
             self.velocity.x.array[:] = self._motion(u.x.array)[1]
 
     def commit(self, u: fem.Function) -> None:
         """Keep the motion; what the forces put in and is no kinetic energy was dissipated."""
-        if self._dt == 0.0:
-            self._last["u"] = u.x.array.copy()
+        if not self._moving:
             return
+        self._moving = False
         a, v = self._motion(u.x.array)
         new = {
             "u": u.x.array.copy(),
@@ -240,22 +229,14 @@ class InertiaTerm(Term):
     def state(self) -> dict[str, Array]:
         """Motion of the last commit and sums."""
         out = {name: value.copy() for name, value in self._last.items()}
-        out |= {f"base_{name}": value.copy() for name, value in self._base.items()}
-        return out | {"sums": np.array([self._dt, *self._spent.values()])}
+        return out | {"sums": np.array(list(self._spent.values()))}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`."""
         self._last = {name: state[name].copy() for name in REMEMBERED}
-        self._base = {name: state[f"base_{name}"].copy() for name in REMEMBERED}
-        dt, *spent = (float(x) for x in state["sums"])
-        self._spent = dict(zip(self._spent, spent, strict=True))
+        self._spent = dict(zip(self._spent, (float(x) for x in state["sums"]), strict=True))
+        self._dt, self._moving = 0.0, False
         self.velocity.x.array[:] = self._last["v"]
-        # coefficients of the increment that may be gone on with
-        self._b_u.value = self._c_u.value = 0.0
-        self._b_known.x.array[:] = self._c_known.x.array[:] = 0.0
-        last, self._last, self._dt = self._last, self._base, 0.0
-        self.begin(0.0, dt)
-        self._last = last
 
 
 def _density(effect: Inertia, material: Any) -> float:

@@ -30,7 +30,7 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
 
 
-class PlasticBodies(Term):
+class Plasticity(Term):
     """The parts of a continuum made of :class:`fxcrack.Plastic`.
 
     Args:
@@ -41,6 +41,7 @@ class PlasticBodies(Term):
     """
 
     name = "plasticity"
+    path_dependent = True
 
     def __init__(self, continuum: Continuum) -> None:
         if isinstance(continuum.model, PlaneStress):
@@ -121,10 +122,6 @@ class PlasticBodies(Term):
             stress += bulk * trace * ufl.as_vector([1] * 3 + [0] * self._shears)
             total += self._inner(stress, ev) * self._continuum.weight * dx
         return total
-
-    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
-        """Stress of the last update."""
-        return [(self._stress, dx) for _, _, dx in self._parts()]
 
     def begin(self, time: float, dt: float) -> None:
         """Set the temperature at the end of the increment."""
