@@ -17,10 +17,12 @@ from fxcrack.demos import (
     dcb3d,
     enf,
     enhanced_dcb,
+    friction_enf,
     front3d,
     mmb,
     moment_dcb,
     penny,
+    pinch,
     two_cracks,
 )
 
@@ -125,6 +127,28 @@ def test_two_cracks_grow_in_turn():
 def test_moment_dcb_is_straight():
     scene, found = moment_dcb.run(dx=0.5, ny=4, until=26.0)
     assert found["bend"] < 0.005  # the required 0.5 %
+    assert balanced(scene.history)
+
+
+def test_friction_raises_the_onset_load_of_enf_as_beams_say():
+    scenes, rows = friction_enf.run(dx=1.0, ny=3, until=36.0)
+    for _, _, ratio, beams, _, _ in rows:
+        assert ratio == pytest.approx(beams, abs=1e-3)  # 3e-4 was measured at mu = 0.6
+    assert all(balanced(scene.history) for scene in scenes)
+
+
+def test_the_loop_of_enf_with_friction_has_the_area_friction_took():
+    scene, _, spent, area = friction_enf.loop(0.4, dx=1.0, ny=3)
+    assert spent == pytest.approx(area, rel=0.02)  # corners of the loop lie between increments
+    assert balanced(scene.history)
+
+
+def test_pinch_keeps_the_slip_until_the_crack_opens():
+    scene, _, rows = pinch.run(n_crack=20)
+    for _, opening, exact_opening, slip, exact_slip, _ in rows:
+        # 1.8 % at 20 elements per half crack, falling with the element size
+        assert opening == pytest.approx(exact_opening, rel=0.025, abs=1e-9)
+        assert slip == pytest.approx(exact_slip, rel=0.025, abs=1e-9)
     assert balanced(scene.history)
 
 
