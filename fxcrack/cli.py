@@ -16,7 +16,6 @@ import logging
 import os
 import platform
 import sys
-import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,9 +32,12 @@ from rich.table import Table
 from typer.main import get_command
 
 from fxcrack import log
+from fxcrack.abort import all_arrive
 from fxcrack.bench.problem import NAMES, Problem
 from fxcrack.errors import FxcrackError, InputError
+from fxcrack.interrupt import Interrupted
 from fxcrack.output.atomic import replacing
+from fxcrack.output.checkpoint import checkpoints
 from fxcrack.solve.petsc_schur import library
 
 _PATIENCE = 5.0  # seconds a rank that failed waits for the others to fail with it
@@ -82,6 +84,12 @@ def demo(
         Path | None, typer.Option(help="Folder for results.", show_default="out/NAME")
     ] = None,
     fine: Annotated[bool, typer.Option("--fine", help="A finer mesh; takes longer.")] = False,
+    checkpoint: Annotated[
+        bool, typer.Option("--checkpoint", help="Keep state and history in OUT/checkpoints.")
+    ] = False,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="Go on from OUT/checkpoints, and keep them.")
+    ] = False,
 ) -> None:
     """Run a demo."""
     titles = demo_titles()
@@ -94,7 +102,11 @@ def demo(
     if name not in titles:
         raise InputError(f"there is no demo '{name}'; known: {', '.join(titles) or 'none'}")
     module = importlib.import_module(f"fxcrack.demos.{name}")
-    module.main(Path("out") / name if out is None else out, fine=fine)
+    folder = Path("out") / name if out is None else out
+    with contextlib.ExitStack() as stack:
+        if checkpoint or restart:
+            stack.enter_context(checkpoints(folder / "checkpoints", restart=restart, seconds=10.0))
+        module.main(folder, fine=fine)
 
 
 # -- benchmarks ----------------------------------------------------------------------
@@ -243,8 +255,11 @@ def main(argv: Sequence[str] | None = None) -> None:
         code, message = 1, f"fxcrack: {error}"
     except SystemExit as end:
         code = end.code
+        stopped = _interruption(end)
+        if stopped is not None:
+            code, message = stopped.code, f"fxcrack: {stopped}"
     if code:
-        together = _all_failed(comm)
+        together = all_arrive(comm, _PATIENCE)
         if message and (comm.rank == 0 or not together):
             print(message, file=sys.stderr, flush=True)
         if not together:
@@ -253,15 +268,11 @@ def main(argv: Sequence[str] | None = None) -> None:
     sys.exit(code)
 
 
-def _all_failed(comm: MPI.Intracomm) -> bool:
-    """Whether all ranks call this within seconds; collective if they do."""
-    deadline = time.monotonic() + _PATIENCE
-    arrived = comm.Ibarrier()
-    while not arrived.Test():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(0.001)
-    return True
+def _interruption(end: BaseException | None) -> Interrupted | None:
+    """The signal behind an exit: the command line turns Ctrl-C into an exit of its own."""
+    while end is not None and not isinstance(end, Interrupted):
+        end = end.__cause__ or end.__context__
+    return end
 
 
 @contextlib.contextmanager
