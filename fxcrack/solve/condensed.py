@@ -165,6 +165,8 @@ class CondensedModel:
     def take_over_friction(self, memory: FrictionMemory, energy: float) -> None:
         """Go on with states of friction in the next window, and the energy it has taken."""
         self._rubbed, self.friction_energy = memory, energy
+        if hasattr(self, "system"):
+            self.system.friction = None  # that of an earlier step
 
     def _remember(self) -> None:
         """Keep what the states of the interface depend on while the window changes."""

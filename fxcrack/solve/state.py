@@ -111,7 +111,10 @@ def give_equilibrium(model: CondensedModel, arrays: Arrays, force: Array) -> Non
     if system.friction is None:
         model.state = system.linear(loads, force)
     else:
+        # nothing moves, so what slips and what sticks cannot be told from the equilibrium
+        before = system.friction.save()
         model.state = system.equilibrium(loads, force)
+        system.friction.restore(before)
     known = saved != 0.0
     size = np.abs(saved).max(initial=0.0)
     off = float(np.abs(model.state.jump - saved)[known].max(initial=0.0))

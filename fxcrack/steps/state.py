@@ -8,16 +8,14 @@ it is the same on every rank.
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
-import numpy.typing as npt
 
-from fxcrack.criteria import AmplitudeRelease, Ramp
 from fxcrack.errors import InputError
 from fxcrack.output.checkpoint import Arrays, Saved
 from fxcrack.solve.state import give_bonds, give_equilibrium, take_states
-from fxcrack.steps.letting_go import Letting, TimedRelease, ViscousRelease, given_forces
+from fxcrack.steps.letting_go import Letting, given_forces
 from fxcrack.steps.records import ReleaseRecord
 
 if TYPE_CHECKING:
@@ -40,8 +38,7 @@ def take(scene: Scene, books: dict[str, Any]) -> Saved:
     for g in scene.growths:
         arrays |= _take_records(g)
     for i, ramp in enumerate(scene.ramps):
-        arrays[f"ramp.nodes[{i}]"] = ramp.nodes
-        arrays[f"ramp.force[{i}]"] = ramp.force
+        arrays |= _ramp_arrays(i, ramp)
     for p in fatigue.waiting:
         arrays[f"fatigue.waiting[{p}]"] = fatigue.waiting[p]
         arrays[f"fatigue.credit[{p}]"] = fatigue.credit[p]
@@ -112,24 +109,24 @@ def _field(value: Any) -> Any:
 
 
 def _ramp(ramp: Letting) -> dict[str, Any]:
-    if isinstance(ramp, ViscousRelease):
-        return {
-            "p": ramp.p,
-            "viscosity": ramp.viscosity,
-            "time": ramp.time,
-            "remaining": ramp.remaining,
-        }
-    return {"p": ramp.p, "start": ramp.start}
+    """Kind and plain values of a bond that lets go; arrays and its law are kept elsewhere."""
+    values = {f.name: getattr(ramp, f.name) for f in fields(ramp)}
+    numbers = {k: v for k, v in values.items() if isinstance(v, bool | int | float)}
+    return {"kind": type(ramp).__name__, **numbers}
+
+
+def _ramp_arrays(i: int, ramp: Letting) -> Arrays:
+    values = {f.name: getattr(ramp, f.name) for f in fields(ramp)}
+    return {f"ramp.{k}[{i}]": v for k, v in values.items() if isinstance(v, np.ndarray)}
 
 
 def _ramp_of(scene: Scene, i: int, known: dict[str, Any], arrays: Arrays) -> Letting:
-    p = known["p"]
-    nodes: npt.NDArray[np.int64] = np.asarray(arrays[f"ramp.nodes[{i}]"], dtype=np.int64)
-    force: npt.NDArray[np.float64] = np.asarray(arrays[f"ramp.force[{i}]"], dtype=float)
-    if "viscosity" in known:
-        return ViscousRelease(
-            p, nodes, force, known["viscosity"], known["time"], known["remaining"]
-        )
-    law = scene.growths[p].debond.release
-    assert isinstance(law, AmplitudeRelease | Ramp)
-    return TimedRelease(p, nodes, force, law, known["start"])
+    kind = next(k for k in get_args(Letting) if k.__name__ == known["kind"])
+    values: dict[str, Any] = {k: v for k, v in known.items() if k != "kind"}
+    for f in fields(kind):
+        if f"ramp.{f.name}[{i}]" in arrays:
+            values[f.name] = arrays[f"ramp.{f.name}[{i}]"]
+        elif f.name == "law":
+            values["law"] = scene.growths[known["p"]].debond.release
+    ramp: Letting = kind(**values)
+    return ramp

@@ -77,12 +77,12 @@ def turning(comm: MPI.Intracomm) -> fx.Scene:
     return short(comm, contact=True, supports=pins)
 
 
-def flexure(comm: MPI.Intracomm) -> fx.Scene:
+def flexure(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
     """End-notched flexure: the faces press on each other over the support."""
     return specimen(
         enf_2d(comm, half_span=20.0, height=1.5, dx=1.0, ny=1),
         a0=14.0,
-        contact=True,
+        interface=bond(14.0, contact=True, **options),
         criterion=fx.VCCT(GIc=0.2, GIIc=0.8, mix=fx.BK(eta=1.6)),
         supports=[
             fx.Displacement("support_left", y=0.0),
@@ -120,6 +120,14 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     ),
     "event, turning load": (turning, [fx.Static(until=fx.Time(4.0))]),
     "event, shear and contact": (flexure, [fx.Static(until=fx.Releases(8))]),
+    "event, friction": (
+        lambda comm: flexure(comm, friction=0.4),
+        [fx.Static(until=fx.Releases(8))],
+    ),
+    "increments, friction": (
+        lambda comm: flexure(comm, friction=0.4),
+        [fx.Static(until=fx.Releases(6), initial=0.1, maximum=0.1, **INCREMENTS)],
+    ),
     "increments": (short, [fx.Static(until=fx.Releases(6), initial=0.03, **INCREMENTS)]),
     "increments, turning load": (
         turning,
@@ -160,6 +168,10 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     ),
     "viscosity": (
         lambda comm: short(comm, criterion=fx.VCCT(GIc=0.2, viscosity=1e-2)),
+        [fx.Static(until=fx.Releases(4), initial=0.01, maximum=0.01, **INCREMENTS)],
+    ),
+    "viscosity, softening": (
+        lambda comm: short(comm, fx.Progressive(), criterion=fx.VCCT(GIc=0.2, viscosity=1e-2)),
         [fx.Static(until=fx.Releases(4), initial=0.01, maximum=0.01, **INCREMENTS)],
     ),
     "release along an amplitude": (
