@@ -372,7 +372,8 @@ class Front:
         cosine = vectors @ growth / length
         ahead = int(np.argmax(cosine))
         corner, middle = links[behind]
-        if cosine[ahead] < 0.3 or ahead == behind:
+        if cosine[ahead] < 0.3 or ahead == behind or not self.bonded[links[ahead, 1]]:
+            # the surface ends, or the tip on the other side has let the midside node go
             force_nodes, d_ahead = np.array([node, node]), 0.0
         else:
             force_nodes, d_ahead = np.array([node, links[ahead, 1]]), float(length[ahead])
