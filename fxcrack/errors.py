@@ -34,6 +34,10 @@ class ConvergenceError(SolverError):
     """An iteration ended without meeting its tolerance."""
 
 
+class ComesApart(ConvergenceError):
+    """Bonds open without end: the load exceeds what is left of the interface."""
+
+
 def agree(comm: MPI.Comm, problem: str | None, error: type[FxcrackError] = InputError) -> None:
     """Raise on all ranks if any rank found a problem; collective.
 

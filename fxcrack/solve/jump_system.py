@@ -211,7 +211,7 @@ class JumpSystem(LinearJumps):
                     raise ConvergenceError(
                         f"{len(self.soft.bonds)} softening bonds stay unstable at one load"
                     )
-                last = self.pass_unstable(last)
+                last = self._run_through(last)
                 yield here, last
                 continue
             end = self.linear(loads, force)
@@ -243,6 +243,22 @@ class JumpSystem(LinearJumps):
             if at_soft <= step + 1e-12:
                 self.finish([b for b in leaving if self.soft.switch(b, point.jump)])
             here, last = at, point
+
+    def _run_through(self, state: Equilibrium) -> Equilibrium:
+        """The next stable equilibrium at constant load after an unstable one, contact included.
+
+        Contact stays as it is while bonds run open, and is put right afterwards. What changes then
+        does so away from zero gap and pressure, and the work of its pressures is lost energy.
+        """
+        given = state.force.copy()
+        given[self.soft.components] = 0.0
+        last = self.pass_unstable(state)
+        for _, point in self.pieces(last, state.loads, given):
+            last = point
+        touching = np.flatnonzero(self.contact)
+        pressures = [self.forces(s, touching) - s.force[touching] for s in (state, last)]
+        moved = last.jump[touching] - state.jump[touching]
+        return replace(last, lost=-0.5 * float(sum(pressures) @ moved))
 
     def _settle(self, last: Equilibrium, loads: Array, force: Array) -> bool:
         """Choose which of the nodes that just touch stay closed on the way to given loads.

@@ -37,12 +37,15 @@ class Equilibrium:
         force: Given forces on free components, 0 elsewhere, shape (n_window,).
         jump: Jumps, shape (n_window,), length.
         conjugate: Reactions of supports and displacements of load patterns, shape (n_loads,).
+        lost: Energy lost on the way here where contact changed in an unstable state: no force that
+            is given did that work.
     """
 
     loads: Array
     force: Array
     jump: Array
     conjugate: Array
+    lost: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -189,16 +192,20 @@ class LinearJumps:
         )
 
     def restore(self, saved: Snapshot) -> None:
-        """Return to earlier states; only contact and softening may have changed since."""
+        """Return to earlier states; only contact and softening may have changed since.
+
+        What was held is held first: so nothing comes free on the way.
+        """
         self.soft.finished = saved.finished
-        self._set_closed(saved.closed)
-        self.soft.bonds = saved.bonds
+        self.soft.bonds = []
         extra = np.flatnonzero(self.free & ~saved.free)
-        self.contact[extra] = False
         if len(extra):
+            self.contact[extra[~saved.closed[extra]]] = False
             self.hold(extra)
-        elif saved.bonds:
-            self.soft.refresh(self.cholesky)
+        self.closed[:] = saved.closed
+        self.release(np.flatnonzero(saved.free & ~self.free))
+        self.soft.bonds = saved.bonds
+        self.soft.refresh(self.cholesky)
 
     def state_dict(self) -> dict[str, Array]:
         """What a checkpoint keeps of every component, each of shape (n_window,).
@@ -256,7 +263,8 @@ class LinearJumps:
             return -self.cholesky.backward(self._forward @ np.append(loads, 1.0))
         if self._unit is not None:
             known, jump = self._unit
-            scale = float(known @ loads) / float(known @ known)
+            k = int(np.argmax(np.abs(known)))
+            scale = float(loads[k] / known[k])  # no squares: they vanish below 1e-162
             if np.abs(loads - scale * known).max() <= _PROPORTIONAL * np.abs(loads).max():
                 return scale * jump
         if not loads.any():
@@ -335,11 +343,7 @@ class LinearJumps:
     def pass_unstable(self, state: Equilibrium) -> Equilibrium:
         """Run downhill from an unstable state to the next stable one, at constant load."""
         mine = self.soft.components
-        still = state.jump.copy()
-        still[self.cholesky.free] += self.cholesky.backward(self.soft.coupling @ state.jump[mine])
-        still[mine] = 0.0
-        right = self._soft_right(still, state.loads)
-        self.finish(self.soft.snap(right, state.jump[mine]))
+        self.finish(self.soft.snap(state.jump[mine]))
         given = state.force.copy()
         given[mine] = 0.0
         return self.linear(state.loads, given)
@@ -382,8 +386,8 @@ def work_between(a: Equilibrium, b: Equilibrium, n_forces: int) -> float:
 
 
 def bond_work(a: Equilibrium, b: Equilibrium) -> float:
-    """Energy bonds that are letting go take out along a linear piece."""
-    return -0.5 * float((a.force + b.force) @ (b.jump - a.jump))
+    """Energy bonds that are letting go take out along a linear piece, or to a state after it."""
+    return b.lost - 0.5 * float((a.force + b.force) @ (b.jump - a.jump))
 
 
 __all__ = ["Equilibrium", "LinearJumps", "Snapshot", "blend", "bond_work", "work_between"]

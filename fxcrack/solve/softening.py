@@ -8,8 +8,7 @@ With the free jumps condensed out, the softening ones obey a small system
     (S* - B) delta = c - g*,    S* = S_RR - Y^t Y,   Y = L^-1 S_FR,
 
 B the (negative) stiffness of the bonds. Where S* - B is not positive definite the state is
-unstable; the energy is then lowered with the bond forces lagged,  S* delta_new = c(w_old) - g*,
-which decreases it monotonically because the softening energy is concave.
+unstable; the energy is then lowered to the next minimum along the branches of the bonds.
 """
 
 from __future__ import annotations
@@ -19,14 +18,17 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.errors import ConvergenceError
+from fxcrack.errors import ComesApart
 from fxcrack.solve.cholesky import GrowingCholesky
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+Bools = npt.NDArray[np.bool_]
 
 _STIFFEST = 1e-7
 """The secant of a bond that unloads at once is that of this fraction of its final opening."""
+_LOOSE = 1e-12
+"""Stiffness below this fraction of that of the bodies at the nodes is round-off."""
 _EVENT = 1e-10
 """Openings within this fraction of the final one count as equal."""
 
@@ -58,21 +60,24 @@ class SoftBond:
     def force(self, opening: float) -> float:
         """Tensile force at an opening on the present branch."""
         if self.largest is None:
-            return self.strength * (1.0 - opening / self.final)
-        return self.secant * opening
+            return self._envelope(opening)
+        return self._envelope(self.largest) + self.secant * (opening - self.largest)
+
+    def _envelope(self, opening: float) -> float:
+        return self.strength * (1.0 - opening / self.final)
 
     def taken(self, opening: float) -> float:
         """Energy the bond has taken up to an opening, the part it would give back included."""
-        if self.largest is None:
-            return self.strength * opening * (1.0 - 0.5 * opening / self.final)
-        dissipated = 0.5 * self.strength * self.largest
-        return dissipated + 0.5 * self.secant * opening**2
+        most = opening if self.largest is None else self.largest
+        back = most - opening
+        given_back = back * (self._envelope(most) - 0.5 * self.secant * back)
+        return self.strength * most * (1.0 - 0.5 * most / self.final) - given_back
 
     @property
     def secant(self) -> float:
         """Stiffness of the secant branch, force/length."""
         w = max(self.largest or 0.0, _STIFFEST * self.final)
-        return self.strength * (1.0 - w / self.final) / w
+        return self._envelope(w) / w
 
 
 class SoftSet:
@@ -159,6 +164,7 @@ class SoftSet:
                 constant[i:j] = -bond.strength * bond.direction
                 stiffness[i:j, i:j] = bond.strength / bond.final * dyad
             else:
+                constant[i:j] = -bond.force(0.0) * bond.direction
                 stiffness[i:j, i:j] = -bond.secant * dyad
             i = j
         return constant, stiffness
@@ -215,9 +221,10 @@ class SoftSet:
             if b > bond.final - small:
                 return max(bond.final - a, 0.0) / (b - a) if b > a else 0.0
             return 0.0 if b < a - small else np.inf
-        limit = max(bond.largest, _STIFFEST * bond.final)
-        if b > limit + small:
-            return max(limit - a, 0.0) / (b - a)
+        # a stiff branch followed too far would exceed the law
+        small = min(small, 1e-6 * max(bond.largest, _STIFFEST * bond.final))
+        if b > bond.largest + small:
+            return max(bond.largest - a, 0.0) / (b - a) if b > a else 0.0
         return np.inf
 
     def switch(self, bond: SoftBond, jump: Array) -> bool:
@@ -237,84 +244,106 @@ class SoftSet:
 
     # -- passing an unstable state -------------------------------------------------------------
 
-    def snap(self, right: Array, jump: Array) -> list[SoftBond]:
-        """Run downhill from an unstable state at constant load.
+    def snap(self, jump: Array) -> list[SoftBond]:
+        """Run downhill from an unstable equilibrium at constant load.
 
         Args:
-            right: -g* at the present loads, shape (r,).
-            jump: Present soft jumps, shape (r,).
+            jump: Soft jumps of the equilibrium, shape (r,).
 
         Returns:
             Bonds that opened all the way; the branches of the others are set for the new state.
 
         Raises:
-            ConvergenceError: No end was found.
+            ComesApart: There is no end: nothing holds a body once bonds have opened.
         """
         self.snaps += 1
-        edges = np.cumsum([0] + [len(b.components) for b in self.bonds])
-        inverse = np.linalg.inv(self.star)
+        directions, across = self._axes()
+        stiffness = directions @ self.star @ directions.T
+        if len(across):
+            # no force acts across the directions; what is loose there holds nothing
+            coupling = across @ self.star @ directions.T
+            inner = np.linalg.pinv(across @ self.star @ across.T, rcond=_LOOSE, hermitian=True)
+            stiffness -= coupling.T @ inner @ coupling
+        mine = self.components
+        least = _LOOSE * float(self._schur[mine, mine].max())
         strength = np.array([b.strength for b in self.bonds])
         final = np.array([b.final for b in self.bonds])
-        directions = np.zeros((len(self.bonds), edges[-1]))
-        for i, bond in enumerate(self.bonds):
-            directions[i, edges[i] : edges[i + 1]] = bond.direction
-        free_opening = directions @ inverse @ right
-        compliance = directions @ inverse @ directions.T
         w = directions @ jump
         largest = np.array([w_ if b.largest is None else b.largest
                             for b, w_ in zip(self.bonds, w, strict=True)])  # fmt: skip
-        w, largest, steps = downhill(free_opening, compliance, strength, final, w, largest)
+        held = np.array([b.force(w_) for b, w_ in zip(self.bonds, w, strict=True)])
+        opens, largest, steps = downhill(held, stiffness, least, strength, final, w, largest)
         self.snap_steps += steps
         gone = []
-        for bond, now, most in zip(self.bonds, w, largest, strict=True):
+        for bond, on, most in zip(self.bonds, opens, largest, strict=True):
             if most >= bond.final * (1.0 - 10.0 * _EVENT):
                 gone.append(bond)
             else:
-                bond.largest = None if now >= most - 1e-9 * bond.final else float(most)
+                bond.largest = None if on else float(most)
         return gone
+
+    def _axes(self) -> tuple[Array, Array]:
+        """Unit vectors along the openings, shape (n, r), and across them, shape (r - n, r)."""
+        along, across = [], []
+        i, r = 0, len(self.components)
+        for bond in self.bonds:
+            k = len(bond.components)
+            whole = np.zeros((k, r))
+            whole[:, i : i + k] = np.linalg.qr(np.column_stack([bond.direction, np.eye(k)]))[0].T
+            whole[0, i : i + k] = bond.direction
+            along.append(whole[:1])
+            across.append(whole[1:])
+            i += k
+        return np.concatenate(along), np.concatenate(across)
 
 
 def downhill(
-    free_opening: Array,
-    compliance: Array,
+    held: Array,
+    stiffness: Array,
+    least: float,
     strength: Array,
     final: Array,
     w: Array,
     largest: Array,
-) -> tuple[Array, Array, int]:
-    """Openings after running downhill from an unstable equilibrium; w_max never heals.
+) -> tuple[Bools, Array, int]:
+    """Run downhill from an unstable equilibrium to a stable one; w_max never heals.
 
-    The energy 1/2 (w - w_0)^t C^-1 (w - w_0) + sum of what the bonds take is piecewise quadratic.
+    The energy 1/2 (w - w_1)^t K (w - w_1) - F_1^t (w - w_1) + sum of what the bonds take, with
+    the openings w_1 and forces F_1 of the equilibrium it starts from, is piecewise quadratic.
     Each step follows Newton's direction, or that of negative curvature, to the next change of a
-    branch: a bond opens all the way, one that held its force opens again.
+    branch: a bond opens all the way, one that went back opens again. The force is continuous where
+    a bond turns back, so no energy comes from nowhere.
 
     Args:
-        free_opening: w_0, openings without any bond force, shape (n,), length.
-        compliance: C, openings per force, shape (n, n).
+        held: F_1, shape (n,).
+        stiffness: K, forces per opening, shape (n, n).
+        least: Stiffness below which nothing is held.
         strength: F0, shape (n,).
         final: w_f, shape (n,).
-        w: Present openings, shape (n,).
+        w: w_1, shape (n,).
         largest: w_max, shape (n,).
 
     Returns:
-        Openings, largest openings, number of steps.
+        Bonds that soften at the end (the others are gone, or hold on the secant branch), largest
+        openings, number of steps.
 
     Raises:
-        ConvergenceError: No end was found.
+        ComesApart: The energy falls for ever: nothing holds a body once bonds have opened.
     """
-    stiffness = np.linalg.inv(compliance)
     slope = strength / final
-    # openings are small differences of what loads and bonds do alone: round-off of those counts
-    close = np.maximum(1e-11 * final, 1e-13 * np.abs(free_opening).max())
+    start = w
+    close = np.maximum(1e-11 * final, 1e-13 * np.abs(w).max())  # round-off of openings
     level = 1e-7 * float(np.linalg.norm(strength))
     most = 50 * len(w) + 100
     for step in range(1, most):
         largest = np.maximum(largest, w)
         gone = largest >= final - close
-        force = np.where(gone, 0.0, strength * (1.0 - largest / final))
-        gradient = stiffness @ (w - free_opening) + force
-        direction, whole = _direction(
-            stiffness, slope, gradient, level, ~gone & (w >= largest - close)
+        top = np.clip(largest, _STIFFEST * final, final)
+        secant = np.where(gone, 0.0, strength * (1.0 - top / final) / top)
+        turned = strength * (1.0 - largest / final) + secant * np.minimum(w - largest, 0.0)
+        gradient = stiffness @ (w - start) + np.where(gone, 0.0, turned) - held
+        direction, whole, opens = _direction(
+            stiffness, least, slope, secant, gradient, level, ~gone & (w >= largest - close)
         )
         x = 1.0 if whole else np.inf
         for limit in (
@@ -328,26 +357,32 @@ def downhill(
             break
         w = w + x * direction
         if whole and x == 1.0:
-            return w, np.maximum(largest, w), step
-    raise ConvergenceError(
+            return opens, np.maximum(largest, w), step
+    raise ComesApart(
         f"softening bonds: no equilibrium after {step} steps downhill with {len(w)} bonds; "
-        "the load may exceed what the interface can carry at all"
+        "the load exceeds what the interface can carry"
     )
 
 
 def _direction(
-    stiffness: Array, slope: Array, gradient: Array, level: float, opens: npt.NDArray[np.bool_]
-) -> tuple[Array, bool]:
-    """Where to go: Newton's step (True: it ends there), or a direction of negative curvature.
+    stiffness: Array,
+    least: float,
+    slope: Array,
+    secant: Array,
+    gradient: Array,
+    level: float,
+    opens: Bools,
+) -> tuple[Array, bool, Bools]:
+    """Where to go, whether it is Newton's step and ends there, and which bonds soften on the way.
 
-    A slope below ``level`` counts as none. Bonds that would close on the way hold their force
-    and leave the softening set.
+    Otherwise it is a direction of negative curvature. A slope below ``level`` counts as none. Bonds
+    that would close on the way go back on their secant.
     """
     opens = opens.copy()
     while True:
-        curvature = stiffness - np.diag(np.where(opens, slope, 0.0))
+        curvature = stiffness + np.diag(np.where(opens, -slope, secant))
         values, vectors = np.linalg.eigh(curvature)
-        stable = values[0] > 1e-12 * values[-1]
+        stable = values[0] > max(least, 1e-15 * values[-1])
         if stable:
             direction = -np.linalg.solve(curvature, gradient)
         else:
@@ -360,5 +395,5 @@ def _direction(
                 direction = -direction
         back = opens & (direction < 0.0)
         if not back.any():
-            return direction, bool(stable)
+            return direction, bool(stable), opens
         opens &= ~back

@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.criteria import Step
-from fxcrack.errors import InputError
+from fxcrack.errors import ComesApart, InputError
 from fxcrack.output.history import History, Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
@@ -266,12 +266,13 @@ class Account:
             "this step"
         )
 
-    def _separated(self, error: NotPositiveDefinite) -> str:
-        del error
-        reason = (
-            "total separation: letting the next node go would leave a body held by nothing; "
-            "the step ends in the last equilibrium before it"
+    def _separated(self, error: NotPositiveDefinite | ComesApart) -> str:
+        what = (
+            "the load exceeds what is left of the interface"
+            if isinstance(error, ComesApart)
+            else "letting the next node go would leave a body held by nothing"
         )
+        reason = f"total separation: {what}; the step ends in the last equilibrium before it"
         log.warn("%s", reason)
         return reason
 

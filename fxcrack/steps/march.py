@@ -6,7 +6,7 @@ States, energies and rows of the history are kept by :class:`~fxcrack.steps.acco
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.criteria import AmplitudeRelease, CrackLengthVsTime, Ramp, RateCriterion
-from fxcrack.errors import ConvergenceError, InputError
+from fxcrack.errors import ComesApart, ConvergenceError, InputError
 from fxcrack.output.history import Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.jump_system import Equilibrium, blend
@@ -99,7 +99,7 @@ class March(Account):
                 reason = self._run_path()
             else:
                 reason = self._run_events()
-        except NotPositiveDefinite as error:
+        except (NotPositiveDefinite, ComesApart) as error:
             reason = self._separated(error)
         except (TooManyCutbacks, ConvergenceError) as error:
             reason = f"stopped: {error}"
@@ -180,8 +180,11 @@ class March(Account):
             self.increment += 1
             try:
                 pieces = self._pieces(target)
+            except (NotPositiveDefinite, ComesApart):
+                self._undo(books)  # contact and bonds have changed half of the way
+                raise
             except ConvergenceError as error:
-                self.increment -= 1
+                self._undo(books)
                 control.rejected(target - self.time, str(error))
                 continue
             self._follow(pieces, target)
@@ -192,7 +195,6 @@ class March(Account):
                 if not no_matter
             ]
             if max(excess, default=-1.0) > 1e-12:
-                self.increment -= 1
                 used = target - self._undo(books)
                 control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
@@ -231,6 +233,22 @@ class March(Account):
             )
         )
 
+    def _along(self, target: float) -> Iterator[tuple[float, Equilibrium]]:
+        """Pieces of the way to a time; where it leads nowhere, back to the last one reached."""
+        path = self.model.system.pieces(
+            self.model.state, self.loads_at(target), self._force_at(target)
+        )
+        while True:
+            books = self._books()
+            try:
+                piece = next(path, None)
+            except (NotPositiveDefinite, ComesApart):
+                self._undo(books)
+                raise
+            if piece is None:
+                return
+            yield piece
+
     def _follow(self, pieces: list[tuple[float, Equilibrium]], target: float) -> None:
         for _, point in pieces:
             self._advance(self.model.state, point, target)
@@ -238,14 +256,18 @@ class March(Account):
 
     def _books(self) -> Any:
         """What :meth:`_undo` needs to return to the present equilibrium."""
-        kept = (self.time, self.model.state, self.work, self.released, self._by_force, self.viscous)
+        kept = (
+            self.time, self.increment, self.model.state,
+            self.work, self.released, self._by_force, self.viscous,
+        )  # fmt: skip
         return kept, self.model.remember(), self._values, self.model.friction_energy
 
     def _undo(self, books: Any) -> float:
         """Return to an earlier equilibrium, with the same bonds, and its time."""
         kept, states, self._values, self.model.friction_energy = books
         (
-            self.time, self.model.state, self.work, self.released, self._by_force, self.viscous
+            self.time, self.increment, self.model.state,
+            self.work, self.released, self._by_force, self.viscous,
         ) = kept  # fmt: skip
         self.model.recall(states)
         return self.time
@@ -326,9 +348,8 @@ class March(Account):
         system = self.model.system
         begin = self.time
         values = self._values
-        path = system.pieces(self.model.state, self.loads_at(target), self._force_at(target))
         snaps = system.soft.snaps
-        for fraction, point in path:
+        for fraction, point in self._along(target):
             here = self.model.state
             times = (self.time, begin + fraction * (target - begin))
             if system.soft.snaps > snaps:

@@ -64,7 +64,6 @@ class NewtonMarch(March):
                     self.loads_at(guess), self._force_at(guess), guess, guess - begin
                 )
             except ConvergenceError as error:
-                print("cut", guess, error)
                 size = 0.25 * abs(guess - begin)
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
