@@ -195,22 +195,29 @@ class Account:
         viscosity = getattr(g.criterion, "viscosity", 0.0)
         ramp: Letting | None = None
         if g.opening_driven:
+            spend = g.energy_to_spend(nodes, values)
+            soft, energy = nodes[spend > 0.0], spend[spend > 0.0]
             if viscosity > 0.0:
-                spend = g.energy_to_spend(nodes, values)
-                ramp = ViscousSoftening.begin(self.model, g.p, nodes, spend, viscosity, self.time)
+                ramp = ViscousSoftening.begin(self.model, g.p, soft, energy, viscosity, self.time)
+            else:
+                self.model.soften(g.p, soft, energy)
+            self._open_at_once(g, nodes[spend <= 0.0])
         elif not isinstance(law, Step):
             now = self.time if law.driver == "time" else float(self.increment)
             ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)
         elif viscosity > 0.0:
             force = bond_forces_of(self.model, g.p, nodes)
             ramp = ViscousRelease(g.p, nodes, force, viscosity, self.time)
+        else:
+            self._open_at_once(g, nodes)
         if ramp is not None:
             self._ramps[:] = [*still_pulling(self._ramps, self.time, self.increment), ramp]
             self.model.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
-            self.model.open(g.p, nodes)
-            return
-        if g.opening_driven:
-            self.model.soften(g.p, nodes, g.energy_to_spend(nodes, values))
+            self.model.open(g.p, ramp.nodes)
+
+    def _open_at_once(self, g: Growth, nodes: Ints) -> None:
+        """Take the bond forces of nodes away at constant load."""
+        if not len(nodes):
             return
         energy, work = self.model.release(g.p, nodes, self._force_at(self.time))
         self.released += energy

@@ -147,7 +147,10 @@ class RateEvaluator:
         return f, dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
 
     def energy_to_spend(self, nodes: Ints, values: TipValues, release: Release) -> Array:
-        """Energy that softening nodes dissipate until they are free, shape (n,)."""
+        """Energy that softening nodes dissipate until they are free, shape (n,).
+
+        Each unit spends what its area asks for; 0 at nodes that have no part in it.
+        """
         surface = self.model.fronts[self.p].surface
         tips = values.tips
         rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
@@ -164,9 +167,32 @@ class RateEvaluator:
             # 1/2 F0 w_c with the opening of the wake: what crack closure calls G A
             critical = total(rates)
         out = np.zeros(len(nodes))
-        for node_set, rate in zip(tips.force_nodes, critical, strict=True):
-            out[np.isin(nodes, node_set)] = rate
-        return out * surface.areas[nodes]
+        for unit, rate, shares in zip(
+            tips.force_nodes, critical, self._shares(values), strict=True
+        ):
+            whole = rate * surface.areas[np.unique(unit)].sum()
+            for node, share in zip(unit, shares, strict=True):
+                out[nodes == node] = share * whole
+        return out
+
+    def _shares(self, values: TipValues) -> Array:
+        """Part of a unit's energy that each of its nodes spends, shape (n, k).
+
+        That of its product F w in crack closure. On second-order faces the bond at the midside node
+        is often pressed while that of the corner pulls: all is the corner's then.
+        """
+        tips, measured = values.tips, values.measured
+        assert measured is not None
+        n, k = tips.force_nodes.shape
+        force, opening = (m.reshape(n, k, 3) for m in np.split(measured, 2, axis=1))
+        products = force * opening
+        products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)
+        spent = np.maximum(products.sum(axis=2), 0.0)
+        total = spent.sum(axis=1, keepdims=True)
+        shares = np.divide(spent, total, out=np.full((n, k), 1.0 / k), where=total > 0.0)
+        # at the end of a surface the corner stands for both
+        shares[tips.force_nodes[:, 0] == tips.force_nodes[:, -1]] = 1.0
+        return np.asarray(shares)
 
     def needs(self, tips: Tips) -> Ints:
         """Nothing beyond the tips themselves."""

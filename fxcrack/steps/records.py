@@ -76,7 +76,7 @@ def release_records(
         frame = tips.frame[i]
         out.append(
             ReleaseRecord(
-                int(node), time, float(values.f[i]), _three(rates), _three(openings[i, 0]),
+                int(node), float(time), float(values.f[i]), _three(rates), _three(openings[i, 0]),
                 _three(stress @ frame), frame,
             )
         )  # fmt: skip
