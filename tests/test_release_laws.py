@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from specimens import interface_of, specimen
 
 import fxcrack as fx
 from fxcrack.criteria import Ramp
@@ -51,6 +52,24 @@ def test_progressive_release_dissipates_the_toughness(comm):
         # the law's area under the curve is G_c dA by construction; only round-off remains
         assert row["released_energy"] == pytest.approx(TOUGHNESS * (row["a[bond]"] - 30.0), 1e-9)
         assert abs(row["balance"]) <= 1e-9 * row["external_work"]
+    scene.close()
+
+
+def test_second_order_units_spend_the_toughness_of_their_area():
+    # the bond at the midside node ahead is pressed here: the corner's spends for both
+    scene = specimen(dcb_2d(length=60.0, dx=1.0, ny=2, order=2), a0=20.0, release=fx.Progressive())
+    history = scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 26.0)))
+    rows = onsets(history)
+    assert len(rows) == 6
+    assert min(r.CRSTS[0] for r in scene.growths[0].records) < 0.0
+    spent = [(r["released_energy"] - r["snap_energy"]) for r in rows[1:]]
+    # taking the pressed bond away at once frees another 4e-4 of that
+    exact = [TOUGHNESS * (r["a[bond]"] - 20.0) for r in rows[1:]]
+    assert spent == pytest.approx(exact, rel=1e-3)
+    assert abs(history["balance"]).max() <= 1e-9 * history["external_work"].max()
+    # no saw-tooth: little but the softening itself lies between onset and onset
+    loads = np.array([r["R[pin_top.y]"] for r in history if r["event"] == "release"])
+    np.testing.assert_allclose(loads, [r["R[pin_top.y]"] for r in rows], rtol=1e-3)
     scene.close()
 
 
