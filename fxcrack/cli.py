@@ -114,7 +114,7 @@ def demo(
 
 @app.command()
 def bench(
-    name: Annotated[str, typer.Argument(help=" or ".join(NAMES), metavar="NAME")],
+    name: Annotated[str, typer.Argument(help=f"{', '.join(NAMES)} or scale", metavar="NAME")],
     dx: Annotated[
         float | None, typer.Option(help="Element length along the arms [0.0625, in 3-D 0.5].")
     ] = None,
@@ -127,8 +127,27 @@ def bench(
     ] = False,
     json_file: Annotated[Path | None, typer.Option("--json", help="File for the numbers.")] = None,
     repeat: Annotated[int, typer.Option(help="Measure so often, keep the fastest.", min=1)] = 1,
+    sizes: Annotated[str, typer.Option(help="scale: dofs, e.g. 2e4,6e4.")] = "2e4,6e4,1.25e5",
+    shapes: Annotated[str, typer.Option(help="scale: of block, plate, plane.")] = (
+        "block,plate,plane"
+    ),
+    methods: Annotated[str, typer.Option(help="scale: of schur, iterative.")] = "schur,iterative",
+    ranks: Annotated[str, typer.Option(help="scale: numbers of ranks.")] = "1,2",
+    limit: Annotated[float, typer.Option(help="scale: seconds a case may take.")] = 900.0,
+    memory: Annotated[
+        float | None, typer.Option(help="scale: GB a case may take [80 % of the machine's].")
+    ] = None,
+    store: Annotated[
+        Path | None, typer.Option(help="scale: file for the constants of the cost model.")
+    ] = None,
 ) -> None:
-    """Measure a speed problem: a crack that grows from a = 30 to a = 60 in a DCB."""
+    """Measure a speed problem: a crack that grows from a = 30 to a = 60 in a DCB.
+
+    "scale" compares the direct and the iterative method, 1 rank and several, over sizes.
+    """
+    if name == "scale":
+        _scale(sizes, shapes, methods, ranks, limit, memory, json_file, store)
+        return
     from fxcrack.bench import report, run
 
     problem = Problem.make(name, dx, dy, ny)
@@ -137,6 +156,85 @@ def bench(
     if json_file is not None and MPI.COMM_WORLD.rank == 0:
         with replacing(json_file) as temporary:
             temporary.write_text(json.dumps(result, indent=1) + "\n")
+
+
+def _scale(
+    sizes: str,
+    shapes: str,
+    methods: str,
+    ranks: str,
+    limit: float,
+    memory: float | None,
+    json_file: Path | None,
+    store: Path | None,
+) -> None:
+    from fxcrack.bench import fit, scale, scale_report
+    from fxcrack.solve.machine import machine_memory_mb
+
+    comm = MPI.COMM_WORLD
+    if comm.size > 1:
+        raise InputError("'fxcrack bench scale' starts its ranks itself: run it without mpirun")
+    try:
+        cases = scale.suite(
+            [float(s) for s in sizes.split(",")], shapes.split(","), methods.split(","),
+            [int(r) for r in ranks.split(",")],
+        )  # fmt: skip
+    except ValueError as error:
+        raise InputError(f"sizes '{sizes}', ranks '{ranks}': give numbers with commas") from error
+    most = 0.8 * machine_memory_mb(comm) if memory is None else 1e3 * memory
+    console = Console(stderr=True, highlight=False)
+
+    def tell(case: dict[str, Any]) -> None:
+        words = f"{case['shape']} {case['dofs']:.0f} {case['method']} {case['ranks']} ranks: "
+        console.print(words + (case.get("failed") or f"{case['seconds']['total']:.1f} s"))
+
+    result = scale.run(cases, memory_mb=most, limit=limit, tell=tell)
+    scale_report.show(result, _console())
+    wanted = [(json_file, result), (store, fit.constants(result) if store else None)]
+    for path, content in wanted:
+        if path is not None:
+            with replacing(path) as temporary:
+                temporary.write_text(json.dumps(content, indent=1) + "\n")
+
+
+@app.command()
+def cost(
+    dofs: Annotated[str, typer.Option(help="Displacement dofs.")] = "1e6,1e7,1e8",
+    dim: Annotated[int, typer.Option(help="2 or 3.")] = 3,
+    window: Annotated[float, typer.Option(help="Jump components that open or are watched.")] = 2e3,
+    releases: Annotated[float, typer.Option(help="Events.")] = 500.0,
+    shape: Annotated[str, typer.Option(help="block (compact) or plate (slender).")] = "block",
+    ranks: Annotated[int | None, typer.Option(help="Ranks [as many as memory asks for].")] = None,
+    memory: Annotated[
+        float | None, typer.Option(help="GB per rank [this machine's over its cores].")
+    ] = None,
+    constants: Annotated[
+        Path | None, typer.Option(help="File of 'bench scale --store' [the shipped one].")
+    ] = None,
+) -> None:
+    """Say what an analysis will cost, on how many ranks, and by which solver."""
+    from fxcrack.bench.scale_report import show_cost
+    from fxcrack.solve.cost import Constants, Task, advise, shipped
+    from fxcrack.solve.machine import machine_memory_mb
+
+    measured = shipped() if constants is None else Constants.read(constants)
+    each = 1e9 * memory if memory else 1e6 * machine_memory_mb(MPI.COMM_WORLD) / _cores()
+    try:
+        sizes = [float(n) for n in dofs.split(",")]
+    except ValueError as error:
+        raise InputError(f"dofs = '{dofs}': give numbers with commas") from error
+    tasks = [Task(n, dim, window, releases, shape) for n in sizes]
+    found = [
+        (task, advise(task, bytes_per_rank=each, ranks=ranks, constants=measured)) for task in tasks
+    ]
+    show_cost(found, measured, _console())
+
+
+def _cores() -> int:
+    """Cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 # -- accuracy ------------------------------------------------------------------------
@@ -194,7 +292,7 @@ def information() -> dict[str, str]:
     schur = "taken out of MUMPS through PETSc's C interface"
     if library() is None:
         schur = "by back-solves (PETSc's C interface with MUMPS cannot be reached)"
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    cores = _cores()
     mpi = MPI.Get_library_version().replace("\0", "").split("\n")[0].split(",")[0]
     return {
         "fxcrack": fxcrack.__version__,

@@ -236,7 +236,7 @@ def test_columns_are_computed_once(comm: MPI.Intracomm) -> None:
     scene = dcb(comm, dx=1.0, ny=2, options=options)
     history = grow_to(scene, 40.0)
     assert scene.model.rebases >= 3
-    store = scene.model._columns
+    store = scene.model.columns
     assert store is not None and store.space is not None
     known = store.space.known
     assert len(np.unique(known)) == len(known) < 2 * (10 + 8) + 4

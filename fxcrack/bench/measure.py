@@ -2,8 +2,9 @@
 
 The growth: from the mesh in memory to the onset at the last crack length, form compilation apart.
 The solve: A = T^t K T with every bonded jump held at zero, factored by MUMPS' Cholesky method with
-the options of the condensation, and one back-solve. Memory is the highest resident size of a
-process, summed over the ranks; it counts libraries and mesh too, so the solve gets a process of
+the workspace of the condensation, and one back-solve; factored once more with its ordering.
+Memory is the highest resident size of a process, summed over the ranks; it counts libraries and
+mesh too, so the solve gets a process of
 its own:  python -m fxcrack.bench.measure dcb2d 0.0625 0.125 32
 """
 
@@ -29,7 +30,7 @@ from fxcrack.interface.jumps import HELD, INNER, build_coordinates
 from fxcrack.mesh import Mesh
 from fxcrack.output.history import History, Row
 from fxcrack.scene import Scene
-from fxcrack.solve.petsc_schur import mumps_message
+from fxcrack.solve.petsc_schur import mumps_message, ordering
 
 _WORKSPACE = 40  # per cent more than MUMPS estimates (ICNTL(14)), as in the condensation
 _CHILD_LIMIT = 1800.0  # seconds
@@ -122,8 +123,13 @@ def grow(problem: Problem, mesh: Mesh) -> tuple[Growth, Scene]:
     return Growth(history, last, seconds, slowest(comm, compiled - made), peak_memory(comm)), scene
 
 
-def mumps_cholesky(matrix: PETSc.Mat) -> PETSc.PC:
-    """A Cholesky factorisation by MUMPS, which the result's ``setUp`` performs."""
+def mumps_cholesky(matrix: PETSc.Mat, order: int | None = None) -> PETSc.PC:
+    """A Cholesky factorisation by MUMPS, which the result's ``setUp`` performs.
+
+    Args:
+        matrix: Symmetric positive definite.
+        order: MUMPS' ICNTL(7); its own choice by default.
+    """
     matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
     matrix.setOption(PETSc.Mat.Option.SPD, True)
     solver = PETSc.PC().create(matrix.getComm())
@@ -132,6 +138,8 @@ def mumps_cholesky(matrix: PETSc.Mat) -> PETSc.PC:
     solver.setFactorSolverType("mumps")
     solver.setFactorSetUpSolverType()
     solver.getFactorMatrix().setMumpsIcntl(14, _WORKSPACE)
+    if order is not None:
+        solver.getFactorMatrix().setMumpsIcntl(7, order)
     return solver
 
 
@@ -146,8 +154,14 @@ def check_mumps(solver: PETSc.PC) -> None:
         raise SolverError(mumps_message(code, detail))
 
 
-def solve_once(problem: Problem, mesh: Mesh) -> dict[str, float]:
-    """The static solve at a = 30: seconds by phase, the load at opening 1; collective."""
+def solve_once(problem: Problem, mesh: Mesh, *, compare: bool = True) -> dict[str, float]:
+    """The static solve at a = 30: seconds by phase, the load at opening 1; collective.
+
+    Args:
+        problem: Which.
+        mesh: Its mesh.
+        compare: Factor a second time, in the ordering of the condensation.
+    """
     comm = mesh.comm
     scene = problem.scene(mesh)
     scene.continuum.compile()
@@ -179,10 +193,18 @@ def solve_once(problem: Problem, mesh: Mesh) -> dict[str, float]:
     clock.append(time.perf_counter())
     solver.apply(right, solution)
     clock.append(time.perf_counter())
+    solver.destroy()
+    if compare:
+        begin = time.perf_counter()
+        solver = mumps_cholesky(matrix, ordering(mesh.gdim))
+        solver.setUp()
+        check_mumps(solver)
+        ordered = slowest(comm, time.perf_counter() - begin)
+        solver.destroy()
     load = pull.dot(solution)  # the load is the work of the unit opening on the solution
 
     assemble, transform, _, factor, solve = (slowest(comm, x) for x in np.diff(clock))
-    for thing in (solver, matrix, coordinates.transform, solution, right, pull):
+    for thing in (matrix, coordinates.transform, solution, right, pull):
         thing.destroy()
     scene.close()
     return {
@@ -190,6 +212,7 @@ def solve_once(problem: Problem, mesh: Mesh) -> dict[str, float]:
         "transform": transform,
         "plain_factor": factor,
         "one_solve": solve,
+        **({"plain_factor_same_order": ordered} if compare else {}),
         "load": float(load),
     }
 
@@ -230,7 +253,7 @@ def main() -> None:
     name, dx, dy, ny = sys.argv[1:]
     comm = MPI.COMM_WORLD
     problem = Problem.make(name, float(dx), float(dy), int(ny))
-    solve_once(problem, problem.mesh(comm))
+    solve_once(problem, problem.mesh(comm), compare=False)
     memory = peak_memory(comm)
     if comm.rank == 0:
         print(json.dumps({"memory": memory, "version": fxcrack.__version__}), flush=True)

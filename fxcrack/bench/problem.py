@@ -22,6 +22,7 @@ from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.models import PlaneStrain, Solid
 from fxcrack.output.history import Row
 from fxcrack.scene import Scene
+from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.steps.growth import Debond
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength
@@ -102,7 +103,7 @@ class Problem:
             mesh = dcb_2d(comm, dx=self.dx, ny=self.ny)
         return mesh
 
-    def scene(self, mesh: Mesh) -> Scene:
+    def scene(self, mesh: Mesh, options: CondensedOptions | None = None) -> Scene:
         """Material, supports and the bonded interface "bond" on a mesh; collective."""
         bond = Interface(
             slave="upper_face",
@@ -122,6 +123,7 @@ class Problem:
             model=Solid() if self.is_3d else PlaneStrain(),
             supports=supports,
             debonds=[Debond(bond, VCCT(GIc=_GC))],
+            options=options,
         )
 
     def step(self, scene: Scene) -> Static:

@@ -3,10 +3,13 @@
     L L^t = S[free, free]
 
 Appending k unknowns costs one forward substitution, removing some costs the trailing block.
-All work is done on blocks of rows, by BLAS, without copies of the stored factor.
+All work is done on strips of rows, by BLAS; a strip is no wider than its last diagonal entry, so
+the factor takes half of S, and it grows without copies.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator
 
 import numpy as np
 import numpy.typing as npt
@@ -41,7 +44,7 @@ class GrowingCholesky:
     def __init__(self, matrix: Array, *, floor: float = 1e-10) -> None:
         self._matrix = matrix
         self._floor = floor
-        self._rows = np.zeros((0, 0))
+        self._strips: list[Array] = []  # rows of L, 64 by 64, no wider than their last diagonal
         self._inverse: list[Array] = []
         self.free: Ints = np.zeros(0, dtype=np.int64)
 
@@ -49,19 +52,44 @@ class GrowingCholesky:
         """Number of free unknowns."""
         return len(self.free)
 
-    def _reserve(self, n: int) -> None:
-        if n > len(self._rows):
-            size = min(max(2 * len(self._rows), n, 256), max(len(self._matrix), n))
-            bigger = np.zeros((size, size))
-            old = len(self.free)
-            bigger[:old, :old] = self._rows[:old, :old]
-            self._rows = bigger
+    def _write(self, first: int, rows: Array) -> None:
+        """Store rows of L from a row on, shape (k, at least the columns up to their diagonals)."""
+        for block, a, b, width in self._strips_of(first, first + len(rows)):
+            if block == len(self._strips):
+                self._strips.append(np.zeros((_BLOCK, width)))
+            width = min(width, rows.shape[1])
+            begin = block * _BLOCK
+            self._strips[block][a - begin : b - begin, :width] = rows[a - first : b - first, :width]
+
+    def _read(self, first: int, left: int, right: int) -> Array:
+        """Rows of L from ``first`` on, columns ``left`` to ``right``, zero above the diagonal."""
+        n = len(self.free)
+        out = np.zeros((n - first, right - left))
+        for block, a, b, width in self._strips_of(first, n):
+            width = min(width, right)
+            if width > left:
+                begin = block * _BLOCK
+                part = self._strips[block][a - begin : b - begin, left:width]
+                out[a - first : b - first, : width - left] = part
+        return out
+
+    @staticmethod
+    def _strips_of(first: int, last: int) -> Iterator[tuple[int, int, int, int]]:
+        """Number, first and last row, and width of the strips that hold some rows."""
+        for block in range(first // _BLOCK, (last + _BLOCK - 1) // _BLOCK):
+            begin = block * _BLOCK
+            yield block, max(first, begin), min(last, begin + _BLOCK), begin + _BLOCK
+
+    def corner(self, k: int) -> Array:
+        """Diagonal block of the last k unknowns, lower triangular, shape (k, k)."""
+        n = len(self.free)
+        return self._read(n - k, n - k, n)
 
     def _diagonal_inverse(self, block: int) -> Array:
         """Inverse of a whole diagonal block, kept once the block is full."""
         while len(self._inverse) <= block:
             i = len(self._inverse) * _BLOCK
-            tile = np.asfortranarray(self._rows[i : i + _BLOCK, i : i + _BLOCK])
+            tile = np.asfortranarray(self._strips[len(self._inverse)][:, i:])
             inverse, _ = lapack.dtrtri(tile, lower=1)
             self._inverse.append(np.tril(inverse))
         return self._inverse[block]
@@ -78,7 +106,7 @@ class GrowingCholesky:
         for block in range(start // _BLOCK, (n + _BLOCK - 1) // _BLOCK):
             i, j = block * _BLOCK, min((block + 1) * _BLOCK, n)
             if i:
-                y[i:j] -= self._rows[i:j, :i] @ y[:i]
+                y[i:j] -= self._strips[block][: j - i, :i] @ y[:i]
             y[i:j] = self._solve_tile(block, j - i, y[i:j], transposed=False)
         return y
 
@@ -90,7 +118,7 @@ class GrowingCholesky:
             i, j = block * _BLOCK, min((block + 1) * _BLOCK, n)
             x[i:j] = self._solve_tile(block, j - i, x[i:j], transposed=True)
             if i:
-                x[:i] -= self._rows[i:j, :i].T @ x[i:j]
+                x[:i] -= self._strips[block][: j - i, :i].T @ x[i:j]
         return x
 
     def _solve_tile(self, block: int, width: int, right: Array, *, transposed: bool) -> Array:
@@ -98,7 +126,7 @@ class GrowingCholesky:
             inverse = self._diagonal_inverse(block)
             return np.asarray((inverse.T if transposed else inverse) @ right)
         i = block * _BLOCK
-        tile = np.asfortranarray(self._rows[i : i + width, i : i + width])
+        tile = np.asfortranarray(self._strips[block][:width, i : i + width])
         columns = right.reshape(width, -1)
         x, _ = lapack.dtrtrs(tile, columns, lower=1, trans=1 if transposed else 0)
         return np.asarray(x).reshape(right.shape)
@@ -134,10 +162,7 @@ class GrowingCholesky:
         extra = np.asarray(extra, dtype=np.int64)
         y, star = self.reduced(extra)
         tile = self.factorise(star, extra)
-        n, k = len(self.free), len(extra)
-        self._reserve(n + k)
-        self._rows[n : n + k, :n] = y.T
-        self._rows[n : n + k, n : n + k] = tile
+        self._write(len(self.free), np.hstack([y.T, tile]))
         self.free = np.concatenate([self.free, extra])
         return y.T
 
@@ -170,16 +195,15 @@ class GrowingCholesky:
             return len(self.free)
         n, first = len(self.free), int(np.argmax(drop))
         keep = np.flatnonzero(~drop[first:]) + first
-        trailing = self._rows[first:n, first:n]
+        trailing = self._read(first, first, n)
         square = trailing @ trailing.T
         inner = keep - first
-        left = self._rows[keep, :first].copy()
+        left = self._read(first, 0, first)[inner]
         self.free = self.free[~drop]
-        m = len(keep)
-        if m:
+        if len(keep):
             tile, _ = lapack.dpotrf(square[np.ix_(inner, inner)], lower=1, clean=1)
-            self._rows[first : first + m, :first] = left
-            self._rows[first : first + m, first : first + m] = tile
+            self._write(first, np.hstack([left, tile]))
+        del self._strips[(len(self.free) + _BLOCK - 1) // _BLOCK :]
         self._inverse = self._inverse[: first // _BLOCK]
         return first
 

@@ -199,6 +199,9 @@ class Condensation:
             self.n_negative = self._factor.n_negative
             timings.factorizations += 1
             self.schur = self._factor.schur
+            if not self._factor.solves:
+                self._factor.destroy()  # nothing needs its memory any more
+                self._factor = None
         else:
             self.schur = self._columns()
         timings.add("factor_with_schur", start)

@@ -26,8 +26,10 @@ from fxcrack.interface.supports import Supports
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensation import Condensation, Timings, border_vectors
+from fxcrack.solve.cost import too_large_for_direct
 from fxcrack.solve.iterative_condensation import ColumnStore, IterativeCondensation, Roles
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work, work_between
+from fxcrack.solve.machine import machine_memory_mb
 from fxcrack.solve.petsc_schur import mumps_message
 from fxcrack.solve.rigid import check_held
 from fxcrack.solve.rubbing import FrictionMemory, let_go, meet, nodes_of, rubs
@@ -51,7 +53,8 @@ class CondensedOptions:
     Args:
         method: "schur", "columns" (both factor the bodies, see :class:`Condensation`), "iterative"
             (columns by conjugate gradients with multigrid, no factorisation: for 3-D models too
-            large for one) or "auto": "schur" where it is available.
+            large for one) or "auto": "schur" where it is available, "iterative" where the factors
+            of a 3-D model would not fit the memory of the machine.
         window_mb: Memory the dense matrices of the window may take, and the stored columns of
             "iterative" before old ones are dropped, MB.
         rows: Force the window to reach at most this distance ahead of the front (length);
@@ -94,8 +97,12 @@ class CondensedModel:
         around: Distances ahead of and behind the tips that the criterion looks at, per pair.
         keep: (pair, slave node) of bonds that still carry a given force.
         friction_energy: Energy that friction has taken so far.
+        columns: Columns computed by iteration, ``None`` where the bodies are factored.
         timings: Seconds per phase and number of factorisations.
+        linear: Whether the bodies are, so that S outlives an increment.
     """
+
+    linear = True
 
     def __init__(
         self,
@@ -130,9 +137,9 @@ class CondensedModel:
         self.friction_energy = 0.0
         self._cost = CostModel.guess(continuum.n_global, continuum.gdim)
         self._column_cost = ColumnCost.guess(continuum.n_global)
-        self._columns: ColumnStore | None = None
-        if options.method == "iterative":
-            self._columns = ColumnStore(
+        self.columns: ColumnStore | None = None
+        if options.method == "iterative" or (options.method == "auto" and self._too_large()):
+            self.columns = ColumnStore(
                 continuum, pairs, supports, rtol=options.rtol, cap_mb=options.window_mb
             )
         self._stiffness: PETSc.Mat | None = None
@@ -140,6 +147,16 @@ class CondensedModel:
         self._condensation: Condensation | IterativeCondensation | None = None
         self.system: JumpSystem
         self.state: Equilibrium
+
+    def _too_large(self) -> bool:
+        """Whether a factorisation would not fit the memory, which is logged; collective."""
+        if not self.linear or self.continuum.gdim < 3:
+            return False
+        comm = self.continuum.comm
+        reason = too_large_for_direct(self.continuum.n_global, 1e6 * machine_memory_mb(comm))
+        if reason is not None:
+            log.warn("%s: the iterative method is used (method='schur' insists)", reason)
+        return reason is not None
 
     # -- the window ----------------------------------------------------------------------
 
@@ -214,7 +231,7 @@ class CondensedModel:
             self.fronts,
             self.active,
             reach,
-            self._cost if self._columns is None else self._column_cost,
+            self._cost if self.columns is None else self._column_cost,
             around=self.around,
             keep=[*(b.where[:2] for b in self._soft), *self.keep],
             cap_mb=self.options.window_mb,
@@ -223,8 +240,8 @@ class CondensedModel:
         if self._condensation is not None:
             self._condensation.destroy()
             self._condensation = None
-        if self._columns is not None:
-            return self._condense_by_columns(self._columns, roles)
+        if self.columns is not None:
+            return self._condense_by_columns(self.columns, roles)
         start = time.perf_counter()
         coordinates = build_coordinates(
             self.continuum, self.pairs, roles, self.supports, len(self._borders)
@@ -235,7 +252,7 @@ class CondensedModel:
     def _condense(self, coordinates: JumpCoordinates) -> None:
         """Factor, and set up the dense system of the window; collective."""
         assert self._stiffness is not None
-        if self._columns is None:
+        if self.columns is None:
             start = time.perf_counter()
             self._condensation = Condensation(
                 self._stiffness,
@@ -645,8 +662,8 @@ class CondensedModel:
         if self._condensation is not None:
             self._condensation.destroy()
             self._condensation = None
-        if self._columns is not None:
-            self._columns.destroy()
+        if self.columns is not None:
+            self.columns.destroy()
         for vector in self._borders:
             vector.destroy()
         if self._stiffness is not None:

@@ -157,9 +157,8 @@ class LinearJumps:
         if not len(new):
             return
         left = self.cholesky.append(new)
-        n, k = left.shape[1], len(new)
         right = self._load_columns_at(new) - left @ self._forward
-        tile = self.cholesky._rows[n : n + k, n : n + k]
+        tile = self.cholesky.corner(len(new))
         self._forward = np.vstack([self._forward, np.linalg.solve(tile, right)])
         if self.soft.bonds:
             self.soft.extend(new, left, tile)

@@ -90,6 +90,8 @@ class NewtonModel(CondensedModel):
         at: Time of the last trial.
     """
 
+    linear = False
+
     def __init__(
         self,
         continuum: Continuum,

@@ -1,0 +1,285 @@
+"""How seconds and memory grow with the size of a model: direct against iterative, 1 rank against 2.
+
+Each case runs in processes of its own: mesh, condensation onto the window a crack needs for its
+first two rows, growth over these rows, one displacement field. Memory is the highest resident size
+less that before the mesh, summed over ranks.
+
+    python -m fxcrack.bench.scale block 20000 iterative 0
+"""
+
+from __future__ import annotations
+
+import json
+import resource
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from datetime import date
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+import fxcrack
+from fxcrack import processes
+from fxcrack.bench.measure import peak_memory, slowest
+from fxcrack.bench.problem import LENGTHS, Problem
+from fxcrack.errors import FxcrackError, InputError
+from fxcrack.mesh import Mesh
+from fxcrack.meshes.dcb import dcb_3d
+from fxcrack.solve.cholesky import GrowingCholesky
+from fxcrack.solve.condensed import CondensedOptions
+from fxcrack.solve.machine import machine_name
+from fxcrack.steps.static import Static
+from fxcrack.steps.until import CrackLength
+
+SHAPES = ("block", "plate", "plane")
+"""A cube cut by a crack; the thin 3-D arms of "dcb3d"; those of "dcb2d"."""
+
+_BLOCK = 100.0
+_ROWS = 2  # of the front that open
+
+Result = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One model, one method, a number of ranks.
+
+    Attributes:
+        shape: "block", "plate" or "plane".
+        dofs: Wanted number of displacement dofs; the mesh comes near it.
+        method: "schur" or "iterative".
+        ahead: Whether the window holds all of the path from a = 30 to 60.
+        ranks: Number of processes.
+    """
+
+    shape: str
+    dofs: float
+    method: str
+    ahead: bool = False
+    ranks: int = 1
+
+    def __post_init__(self) -> None:
+        if self.shape not in SHAPES:
+            raise InputError(f"shape = '{self.shape}': choose one of {', '.join(SHAPES)}")
+        if self.method not in ("schur", "iterative"):
+            raise InputError(f"method = '{self.method}': choose schur or iterative")
+        if not 500 <= self.dofs <= 1e9 or self.ranks < 1:
+            raise InputError(f"dofs = {self.dofs}, ranks = {self.ranks}: choose sensible numbers")
+
+    @property
+    def dim(self) -> int:
+        """Dimension."""
+        return 2 if self.shape == "plane" else 3
+
+    def problem(self) -> Problem:
+        """The speed problem whose scene is used, with the element size that gives the dofs."""
+        if self.shape == "block":
+            n = max(2 * round(0.5 * ((self.dofs / 3.0) ** (1.0 / 3.0) - 1.3)), 4)
+            return Problem("dcb3d", _BLOCK / n, _BLOCK / n, n // 2)
+        name = "dcb2d" if self.shape == "plane" else "dcb3d"
+        sizes = 10.0 / 2.0 ** np.linspace(0.0, 12.0, 400)
+        counts = [_count(name, dx) for dx in sizes]
+        dx = float(sizes[int(np.argmin(np.abs(np.log(np.array(counts) / self.dofs))))])
+        return Problem.make(name, 100.0 / round(100.0 / dx))
+
+    def mesh(self, comm: MPI.Intracomm) -> Mesh:
+        """Make the mesh; collective."""
+        problem = self.problem()
+        if self.shape != "block":
+            return problem.mesh(comm)
+        mesh: Mesh = dcb_3d(
+            comm, length=_BLOCK, width=_BLOCK, height=0.5 * _BLOCK,
+            dx=problem.dx, dy=problem.dx, ny=problem.ny,
+        )  # fmt: skip
+        return mesh
+
+
+def _count(name: str, dx: float) -> float:
+    arms = 2.0 * (100.0 / dx + 1.0) * (2.0 / dx + 1.0)
+    return 2.0 * arms if name == "dcb2d" else 3.0 * arms * (10.0 / dx + 1.0)
+
+
+def suite(
+    sizes: list[float], shapes: list[str], methods: list[str], ranks: list[int]
+) -> list[Case]:
+    """Cases for all sizes; several ranks and a large window at the middle size only.
+
+    In 2-D the direct method alone is measured, at sizes five times as large.
+    """
+    middle = sorted(sizes)[len(sizes) // 2]
+    out = []
+    for shape in shapes:
+        factor = 5.0 if shape == "plane" else 1.0
+        for method in methods if shape != "plane" else ["schur"]:
+            out += [Case(shape, factor * s, method, False, 1) for s in sorted(sizes)]
+            out += [Case(shape, factor * middle, method, False, p) for p in ranks if p > 1]
+        if "schur" in methods:
+            out.append(Case(shape, factor * middle, "schur", True))
+    return out
+
+
+def measure(case: Case, comm: MPI.Intracomm) -> Result:
+    """Run a case in the processes at hand; collective, the same result on every rank."""
+    before = peak_memory(comm)
+    comm.Barrier()
+    clock = [time.perf_counter()]
+    mesh = case.mesh(comm)
+    clock.append(time.perf_counter())
+    problem = case.problem()
+    scene = problem.scene(mesh, CondensedOptions(method=case.method))
+    clock.append(time.perf_counter())
+    scene.continuum.compile()
+    clock.append(time.perf_counter())
+    (debond,) = scene.debonds
+    if case.ahead:
+        scene.model.prepare([True], [LENGTHS[-1] - LENGTHS[0]])
+    else:
+        reach = LENGTHS[0] + _ROWS * problem.dx
+        scene.run(Static(until=CrackLength(debond.interface, reach)), progress=False)
+        scene.model.displacement().destroy()
+    end = time.perf_counter()
+    spent = scene.model.timings.seconds
+    seconds = {"mesh": clock[1] - clock[0], "scene": clock[2] - clock[1]}
+    for phase in ("assemble", "transform", "factor_with_schur", "factor_inner", "multigrid"):
+        seconds[phase] = spent.get(phase, 0.0)
+    seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "march", "fields")}
+    seconds["total"] = end - clock[0] - (clock[3] - clock[2])
+    system = scene.model.system
+    store = scene.model.columns
+    space = store.space if store is not None else None
+    result: Result = {
+        **asdict(case),
+        "dim": case.dim,
+        "dofs": scene.continuum.n_global,
+        "window": system.n_window,
+        "releases": sum(g.n_released for g in scene.growths),
+        "seconds": {k: slowest(comm, v) for k, v in seconds.items()},
+        "columns": len(space.known) if space is not None else 0,
+        "iterations": float(np.mean(space.iterations)) if space is not None else 0.0,
+        "memory_mb": peak_memory(comm) - before,
+        "before_mb": before,
+    }
+    if not case.ahead:
+        row = scene.history.rows[-1]
+        result["opening"], result["load"] = problem.opening(row), problem.load(row)
+    result["bytes_per_dof"] = 1e6 * result["memory_mb"] / result["dofs"]
+    scene.close()
+    return result
+
+
+def dense_rate(n: int = 1500) -> Result:
+    """Seconds of the dense algebra: a factor per n^3, a release with equilibrium per n^2."""
+    rng = np.random.default_rng(0)
+    base = rng.standard_normal((n, n))
+    matrix = base @ base.T + n * np.eye(n)
+    cholesky = GrowingCholesky(matrix)
+    start = time.perf_counter()
+    cholesky.append(np.arange(n - 60))
+    factor = time.perf_counter() - start
+    start = time.perf_counter()
+    for i in range(n - 60, n, 3):
+        cholesky.append(np.arange(i, i + 3))
+        cholesky.solve(matrix[cholesky.free, 0])
+    each = (time.perf_counter() - start) / 20
+    return {"factor_per_cube": factor / (n - 60) ** 3, "release_per_square": each / n**2}
+
+
+def message_rate(comm: MPI.Intracomm) -> Result:
+    """Latency and seconds per byte between ranks; collective; zeros on one rank."""
+    if comm.size == 1:
+        return {"latency": 0.0, "per_byte": 0.0}
+    seconds = []
+    for size in (8, 4_000_000):
+        block = np.zeros(size // 8)
+        comm.Allreduce(MPI.IN_PLACE, block)
+        comm.Barrier()
+        count = 200 if size < 100 else 10
+        start = time.perf_counter()
+        for _ in range(count):
+            comm.Allreduce(MPI.IN_PLACE, block)
+        seconds.append(slowest(comm, time.perf_counter() - start) / count)
+    return {"latency": seconds[0], "per_byte": max(seconds[1] - seconds[0], 0.0) / 4e6}
+
+
+def run(
+    cases: list[Case],
+    *,
+    memory_mb: float,
+    limit: float,
+    tell: Callable[[Result], None] | None = None,
+) -> Result:
+    """Run cases one after the other, each in its own processes.
+
+    Args:
+        cases: What to run.
+        memory_mb: Memory a case may take, all ranks together, MB.
+        limit: Seconds a case may take.
+        tell: Called with every result.
+
+    Returns:
+        Date, machine, and the results; a case that failed has "failed" with the reason.
+    """
+    out: Result = {
+        "date": date.today().isoformat(),
+        "machine": machine_name(),
+        "version": fxcrack.__version__,
+        "dense": dense_rate(),
+        "cases": [],
+    }
+    for case in cases:
+        words = [case.shape, f"{case.dofs:g}", case.method, str(int(case.ahead))]
+        words.append(f"{memory_mb / case.ranks:.0f}")
+        result = {**asdict(case), "dim": case.dim, **_start(words, case.ranks, limit)}
+        out["message"] = result.pop("message", out.get("message"))
+        out["cases"].append(result)
+        if tell is not None:
+            tell(result)
+    return out
+
+
+def _start(words: list[str], ranks: int, limit: float) -> Result:
+    """The result of a case in processes of its own, or "failed" with the reason."""
+    command = processes.command(__name__, words, ranks)
+    if command is None:
+        return {"failed": "there is no mpiexec"}
+    try:
+        done = subprocess.run(
+            command, env=processes.environment(), capture_output=True, text=True, check=True,
+            timeout=limit, stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+        found: Result = json.loads(done.stdout.splitlines()[-1])
+    except subprocess.TimeoutExpired:
+        return {"failed": f"not finished after {limit:g} s"}
+    except subprocess.CalledProcessError as error:
+        return {"failed": f"code {error.returncode}: {error.stderr.strip()[-200:]}"}
+    except (OSError, ValueError, LookupError) as error:
+        return {"failed": f"{type(error).__name__}: {error}"}
+    return found
+
+
+def main() -> None:
+    """Measure one case in this process and its companions, and print the result."""
+    shape, dofs, method, ahead, memory_mb = sys.argv[1:]
+    comm = MPI.COMM_WORLD
+    if float(memory_mb) > 0.0:
+        most = int(float(memory_mb) * 1e6)
+        resource.setrlimit(resource.RLIMIT_DATA, (most, most))
+    case = Case(shape, float(dofs), method, bool(int(ahead)), comm.size)
+    try:
+        result = measure(case, comm)
+        if comm.size > 1:
+            result["message"] = message_rate(comm)
+    except FxcrackError as error:
+        result = {"failed": str(error)}
+    except MemoryError:
+        result = {"failed": "out of memory"}
+    if comm.rank == 0:
+        print(json.dumps(result), flush=True)
+
+
+if __name__ == "__main__":
+    main()

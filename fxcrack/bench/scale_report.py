@@ -1,0 +1,113 @@
+"""Scale results and cost estimates as tables for a terminal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from fxcrack.solve.cost import Constants, Estimate, Task
+
+Result = dict[str, Any]
+
+
+def _table(title: str, *columns: str) -> Table:
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for i, column in enumerate(columns):
+        table.add_column(column, justify="left" if i == 0 else "right")
+    return table
+
+
+def show(result: Result, console: Console) -> None:
+    """Print a result of :func:`fxcrack.bench.scale.run`."""
+    table = _table(
+        f"direct and iterative, {result['date']}, {result['machine']}",
+        *("shape", "dofs", "method", "ranks", "window", "condense s", "per column ms"),
+        *("iterations", "total s", "memory MB", "kB/dof"),
+    )
+    for c in result["cases"]:
+        start = c["shape"], f"{c['dofs']:.0f}", c["method"], str(c["ranks"])
+        if "failed" in c:
+            table.add_row(*start, c["failed"][:40])
+            continue
+        s = c["seconds"]
+        condense = sum(s[k] for k in ("transform", "factor_with_schur", "multigrid", "columns"))
+        column = f"{1e3 * s['columns'] / c['columns']:.1f}" if c["columns"] else ""
+        table.add_row(
+            *start, str(c["window"]), f"{condense:.2f}", column,
+            f"{c['iterations']:.0f}" if c["columns"] else "", f"{s['total']:.2f}",
+            f"{c['memory_mb']:.0f}", f"{1e-3 * c['bytes_per_dof']:.1f}",
+        )  # fmt: skip
+    console.print(table)
+    strong = _strong(result["cases"])
+    if strong.row_count:
+        console.print(strong)
+
+
+def _strong(cases: list[Result]) -> Table:
+    """One rank against several, phase by phase."""
+    table = _table(
+        "time on 1 rank over that on P", "case", "P", "phase", "1 rank s", "P s", "ratio"
+    )
+    done = [c for c in cases if "failed" not in c]
+    for many in (c for c in done if c["ranks"] > 1):
+        for one in done:
+            same = all(one[k] == many[k] for k in ("shape", "dofs", "method", "ahead"))
+            if not same or one["ranks"] != 1:
+                continue
+            title = f"{many['shape']} {many['dofs']} {many['method']}"
+            for phase, seconds in one["seconds"].items():
+                if seconds > 0.02 * one["seconds"]["total"]:
+                    other = many["seconds"][phase]
+                    ratio = f"{seconds / other:.2f}" if other > 0.0 else ""
+                    table.add_row(
+                        title, str(many["ranks"]), phase, f"{seconds:.2f}", f"{other:.2f}", ratio
+                    )
+    return table
+
+
+def show_cost(
+    found: list[tuple[Task, list[Estimate]]], constants: Constants, console: Console
+) -> None:
+    """Print estimates, the best method of each task first."""
+    console.print(f"constants measured {constants.date} on {constants.machine}")
+    console.print("* extrapolated: outside the sizes or ranks measured")
+    for task, estimates in found:
+        title = f"{task.dofs:.3g} dofs, {task.dim}-D, window {task.window:g}, "
+        title += f"{task.releases:g} releases"
+        if not estimates:
+            console.print(
+                f"{title}: no method fits the memory; more ranks, or more memory per rank"
+            )
+            continue
+        table = _table(title, "", *(f"{e.method}, {e.ranks} ranks" for e in estimates))
+        for kind, unit in (("seconds", "s"), ("memory", "GB")):
+            names = list(dict.fromkeys(k for e in estimates for k in getattr(e, kind)))
+            for name in names:
+                table.add_row(
+                    f"{name}, {unit}",
+                    *(
+                        _number(getattr(e, kind).get(name), unit, e.measured.get(name, True))
+                        for e in estimates
+                    ),
+                )
+            totals = [e.total_seconds if unit == "s" else e.total_memory for e in estimates]
+            sure = [all(e.measured[k] for k in getattr(e, kind)) for e in estimates]
+            table.add_row(
+                f"in all, {unit}",
+                *(_number(t, unit, ok) for t, ok in zip(totals, sure, strict=True)),
+                end_section=True,
+            )
+        console.print(table)
+        best = estimates[0]
+        word = "schur" if best.method == "direct" else "iterative"
+        console.print(f"take CondensedOptions(method='{word}') on {best.ranks} ranks\n")
+
+
+def _number(value: float | None, unit: str, measured: bool) -> str:
+    if value is None:
+        return ""
+    value = value if unit == "s" else value / 1e9
+    return f"{value:.3g}{'' if measured else ' *'}"
