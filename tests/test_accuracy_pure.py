@@ -118,7 +118,7 @@ def test_no_power_goes_through_one_point() -> None:
 
 @given(
     st.floats(0.1, 10.0), st.floats(-1.0, 1.0).filter(lambda c: abs(c) > 1e-2),
-    st.floats(0.6, 2.9),
+    st.floats(0.6, 1.95),
 )  # fmt: skip
 def test_extrapolation_finds_limit_and_rate(limit: float, c: float, rate: float) -> None:
     sizes = [0.4, 0.2, 0.1]
@@ -185,8 +185,8 @@ def _line(
 
 
 def test_the_reference_is_the_limit_of_the_best_line_and_the_others_say_how_good_it_is() -> None:
-    runs = _line(Setting(size=1.0), 10.0, 0.06, 1.0)  # 0.015 from its limit
-    runs += _line(Setting(size=1.0, order=2), 10.01, 0.1, 2.0)  # 0.00625 from its limit
+    runs = _line(Setting(size=1.0), 10.0, 0.06, 1.0)  # changes by 0.015 at last
+    runs += _line(Setting(size=1.0, order=2), 10.01, 0.07, 2.0)  # by 0.013
     runs += _line(Setting(size=1.0, stepping="increment"), 12.0, 0.0, 1.0)
     known = own_reference(runs, "event")
     assert known is not None

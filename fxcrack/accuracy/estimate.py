@@ -2,10 +2,10 @@
 
 The same scene is run to its first onset with displacements of the other order on the same mesh. For
 a first-order run the difference is its error, but for the error of the second-order one, which goes
-with the element size as well: half as much is added (on the studies that come with fxcrack the true
-error was never more than the estimate). For a second-order run the difference is the error of the
-first-order one, and so a bound that is often far too large. Increment stepping adds what f exceeded
-1 by. Growth far from the first onset on a coarser mesh is not judged.
+with the element size as well: the estimate is twice the difference. For a second-order run the
+difference is the error of the first-order one, and so a bound that is often far too large.
+Increment stepping adds what f exceeded 1 by. Growth far from the first onset on a coarser mesh is
+not judged.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fxcrack.scene import Scene
     from fxcrack.steps.growth import Debond
 
-_MORE = 1.5
+_MORE = 2.0
 """Estimated error of a first-order run over its difference from the second-order one."""
 _ORDERS = {1: "first", 2: "second"}
 _SMALL = 1e-6
@@ -50,7 +50,8 @@ class Estimate:
 
     Attributes:
         load: Of the load at the first onset; for cycles of the load at their maximum.
-        G: Of the energy release rate at given loads or openings (of f for other criteria).
+        G: Of the energy release rate at given loads or at given openings, the larger one (of f for
+            other criteria).
         stepping: Of the load, by the increments.
         cycles: Of the number of cycles; ``None`` for quasi-static steps.
         order: Order of the displacement.
@@ -233,7 +234,7 @@ def _largest(history: History, name: str) -> float:
 def _differences(
     ours: Row, theirs: Row, name: str, degree: int, scale: float, *, cycles: bool
 ) -> tuple[float, float]:
-    """Relative differences of the load and of G at given loads or openings."""
+    """Relative differences of the load, and of G at given loads or openings, the larger one."""
     moving = [k[2:-1] for k in ours if k.startswith("u[")]
     loads = [f"R[{k}]" for k in moving] + [k for k in ours if k.startswith("F[")]
     drivers = [f"u[{k}]" for k in moving] + [k for k in ours if k.startswith("F[")]
@@ -242,7 +243,7 @@ def _differences(
         key = f"G_max[{name}]"
         return load, abs(float(ours[key]) / float(theirs[key]) - 1.0)
     driver = _largest_difference(ours, theirs, drivers, scale)
-    return load, (1.0 + driver) ** degree - 1.0
+    return load, (1.0 + max(driver, load)) ** degree - 1.0
 
 
 def _largest_difference(ours: Row, theirs: Row, columns: list[str], scale: float) -> float:

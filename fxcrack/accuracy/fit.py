@@ -108,10 +108,10 @@ def plan(
 def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> tuple[float, float, float]:
     """Limit of values for size 0, from the three finest of them.
 
-        v(h) = v0 + c h^p
+        v(h) = v0 + c h^p,      p = log((v1 - v2)/(v2 - v3)) / log r
 
-    With sizes in one ratio r, p = log((v2 - v1)/(v1 - v0'))/log r; p is kept between 1/2 and 3, and
-    is 1 for two sizes or where the values do not approach each other.
+    for sizes in one ratio r. p is kept between 1/2 and 2 (a larger one shows sizes too coarse to
+    tell), and is 1 for two sizes or where the values do not approach each other.
 
     Args:
         sizes: Coarse to fine.
@@ -128,6 +128,6 @@ def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> tuple[float,
     ratio = float(h[-2] / h[-1])
     even = len(h) == 3 and abs(h[0] / h[1] / ratio - 1.0) < 1e-6
     if even and steps[0] * steps[1] > 0.0 and abs(steps[1]) < abs(steps[0]):
-        exponent = float(np.clip(np.log(steps[0] / steps[1]) / np.log(ratio), 0.5, 3.0))
+        exponent = float(np.clip(np.log(steps[0] / steps[1]) / np.log(ratio), 0.5, 2.0))
     correction = float(steps[-1] / (ratio**exponent - 1.0))
     return float(v[-1] + correction), exponent, abs(correction)

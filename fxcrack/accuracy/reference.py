@@ -1,9 +1,9 @@
 """What errors are counted from: an exact closed form, or what the study's own finest runs tend to.
 
 The second needs no theory: on each line of settings that differ in size alone, the values are
-extrapolated to size zero, v(h) = v0 + c h^p. The line with the smallest correction is the
-reference. How far the next best lines are from it, if they come near it at all, says how well it
-is known; else the correction itself does.
+extrapolated to size zero, v(h) = v0 + c h^p. The line that changes least between its two finest
+sizes is the reference. How far the limits of the next best lines are from it, if they change not
+much more, says how well it is known; else the correction by the extrapolation does.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ MAIN = ("load", "G", "length")
 _OTHERS = 2
 """How many lines beside the best say how well it is known."""
 _COMPARABLE = 3.0
-"""Corrections larger than so many times the best line's say nothing about it."""
+"""Lines that change more than so many times as much as the best one say nothing about it."""
 _TOLD = 3
 """Sizes a line needs to be trusted; two are taken only where no line has more."""
 
@@ -77,9 +77,10 @@ def own_reference(runs: Sequence[tuple[Setting, Values]], stepping: str) -> Refe
         limit = {n: v for n, (v, _, _) in found.items() if v != 0.0}
         main = [n for n in limit if n in MAIN] or list(limit)
         if main:
-            worst = max(abs(found[n][2] / limit[n]) for n in main)
+            last, before = (points[i][1] for i in (-1, -2))
+            change = max(abs((last[n] - before[n]) / limit[n]) for n in main)
             shares = {n: abs(found[n][2] / limit[n]) for n in limit}
-            limits.append((worst, line, sizes, limit, shares))
+            limits.append((change, line, sizes, limit, shares))
     if not limits:
         return None
     limits.sort(key=lambda entry: entry[0])
@@ -87,8 +88,8 @@ def own_reference(runs: Sequence[tuple[Setting, Values]], stepping: str) -> Refe
     near = _COMPARABLE * limits[0][0]
     beside = [
         other
-        for correction, _, points, other, _ in limits[1:]
-        if len(points) >= _TOLD and correction <= near
+        for change, _, points, other, _ in limits[1:]
+        if len(points) >= _TOLD and change <= near
     ][:_OTHERS]
     uncertainty = {
         n: max((abs(o[n] / v - 1.0) for o in beside if n in o), default=shares[n])
