@@ -15,6 +15,7 @@ import pytest
 import fxcrack as fx
 from fxcrack import cli
 from fxcrack.accuracy import AccuracyError, Setting, choose
+from fxcrack.accuracy.estimate import estimate_errors
 from fxcrack.accuracy.launch import SettingFailed, TookTooLong, Workers
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.run import run
@@ -151,11 +152,11 @@ def _case(name: str, **choices: Any) -> Any:
 @pytest.mark.mpi
 def test_a_run_that_is_accurate_enough_says_how_it_knows() -> None:
     case = _case("penny", size=0.2)
-    history = case.scene.run(case.step, accuracy=0.05, progress=False)
+    history = case.scene.run(case.step, accuracy=0.06, progress=False)
     found = history.details["accuracy"]
     # the true errors on this mesh: load 0.51 %, G 1.02 %
-    assert 0.0051 < found["load"] < 0.05
-    assert 0.0102 < found["G"] < 0.05
+    assert 0.0051 < found["load"] < 0.06
+    assert 0.0102 < found["G"] < 0.06
     assert "second-order solution" in found["words"]
     case.scene.close()
 
@@ -174,12 +175,12 @@ def test_a_run_that_is_not_accurate_enough_says_so_and_what_to_do() -> None:
 def test_increments_count_as_errors() -> None:
     case = _case("penny", size=0.2, stepping="increment", tolerance=0.2)
     with pytest.raises(AccuracyError, match="stepping='event' or a tolerance") as error:
-        case.scene.run(case.step, accuracy=0.04, progress=False)
+        case.scene.run(case.step, accuracy=0.06, progress=False)
     assert error.value.estimate is not None
     excess = max(float(r["f[bond]"]) for r in case.scene.history if r["event"] == "increment")
     assert error.value.estimate.stepping == pytest.approx(excess**0.5 - 1.0)
     # the mesh alone would do: what it is off by does not depend on the stepping
-    assert error.value.estimate.total - error.value.estimate.stepping < 0.04
+    assert error.value.estimate.total - error.value.estimate.stepping < 0.06
     case.scene.close()
 
 
@@ -224,12 +225,12 @@ def test_the_estimate_is_above_the_true_error_and_not_far(
     name: str, size: float, order: int, load: float, rate: float
 ) -> None:
     case = _case(name, size=size, order=order, stepping=STUDIES[name].steppings[0])
-    history = case.scene.run(case.step, accuracy=0.999, progress=False)
-    found = history.details["accuracy"]
+    case.scene.run(case.step, progress=False)
+    found = estimate_errors(case.scene, case.step, case.scene.debonds)
     # twice the difference for the first order; for the second a bound of the first one's error
     far = 2.5 if order == 1 else 8.0
-    assert load < 100.0 * found["load"] < far * load
-    assert rate < 100.0 * found["G"] < far * rate
+    assert load < 100.0 * found.load < far * load
+    assert rate < 100.0 * found.G < far * rate
     case.scene.close()
 
 
