@@ -14,7 +14,7 @@ by node relaxation (Jean 1999), which lowers the energy at given friction bounds
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
@@ -57,11 +57,15 @@ class ContactBlock:
         stiffness: K, shape (m d, m d), positive semidefinite.
         gap: Initial gaps, shape (m,), length.
         mu: Friction coefficients, shape (m,).
+        factored: The last matrix in the plane with its factor, by the key of its states.
     """
 
     stiffness: Array
     gap: Array
     mu: Array
+    factored: dict[bytes, tuple[Array, tuple[Array, Ints]]] = field(
+        default_factory=dict, compare=False
+    )
 
     @property
     def dim(self) -> int:
@@ -132,8 +136,18 @@ def jumps_of(
     rows = np.flatnonzero(unknown)
     if not len(rows):
         return jump
-    matrix, right = k[rows], load[rows].copy()
+    right = load[rows].copy()
     nodes = np.flatnonzero(slips)
+    key = states.key() if d == 2 else b""
+    if key in block.factored:
+        matrix, factor = block.factored[key]
+        right[np.searchsorted(rows, nodes * d + 1)] += (
+            block.mu[nodes] * states.direction[nodes, 0] * load[nodes * d]
+        )
+        right -= matrix @ jump.ravel()
+        jump.ravel()[rows] = _back(factor, right)
+        return jump
+    matrix = k[rows]
     if len(nodes):
         at = np.searchsorted(rows, (nodes * d)[:, None] + np.arange(1, d))
         tangential, given = matrix[at], right[at]
@@ -153,17 +167,25 @@ def jumps_of(
         matrix[at] = tangential + drag[:, :, None] * k[nodes * d][:, None, :]
         right[at] = given + drag * load[nodes * d][:, None]
     right -= matrix @ jump.ravel()
-    jump.ravel()[rows] = _solve(matrix[:, rows], right)
+    factor = _factor(matrix[:, rows])
+    if key:
+        block.factored.clear()
+        block.factored[key] = matrix, factor
+    jump.ravel()[rows] = _back(factor, right)
     return jump
 
 
-def _solve(matrix: Array, right: Array) -> Array:
+def _factor(matrix: Array) -> tuple[Array, Ints]:
     lu, pivots, info = lapack.dgetrf(matrix)
     diagonal = np.abs(np.diagonal(lu))
     # a body that can slide leaves a row of round-off
     if info != 0 or diagonal.min() <= _SINGULAR * diagonal.max():
         raise Sliding
-    x, _ = lapack.dgetrs(lu, pivots, right)
+    return lu, pivots
+
+
+def _back(factor: tuple[Array, Ints], right: Array) -> Array:
+    x, _ = lapack.dgetrs(*factor, right)
     return np.asarray(x)
 
 

@@ -8,7 +8,7 @@ jumps are coordinates of a dense problem K delta = g + p, the other free jumps c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -75,7 +75,7 @@ class Friction:
         self.reference = np.zeros((0, dim - 1))
         self.error = 0.0
         self.steps = self.increments = 0
-        self._stiffness: tuple[Array, Ints, Array] | None = None
+        self._block: tuple[Array, Ints, ContactBlock] | None = None
 
     # -- nodes and states ----------------------------------------------------------------
 
@@ -109,7 +109,7 @@ class Friction:
         self.states = NodeStates(
             np.append(self.states.status, status), np.vstack([self.states.direction, direction])
         )
-        self._stiffness = None
+        self._block = None
 
     def drop(self, k: int) -> None:
         """Take back the last k nodes."""
@@ -117,7 +117,7 @@ class Friction:
         self.components, self.where = self.components[:n], self.where[:n]
         self.mu, self.gap, self.reference = self.mu[:n], self.gap[:n], self.reference[:n]
         self.states = NodeStates(self.states.status[:n], self.states.direction[:n])
-        self._stiffness = None
+        self._block = None
 
     @property
     def rows(self) -> Ints:
@@ -162,33 +162,38 @@ class Friction:
     def block(self, system: LinearJumps) -> ContactBlock:
         """K at the present free set; kept until S, the nodes or the free set change."""
         free = system.cholesky.free
-        known = self._stiffness
+        known = self._block
         if known is None or known[0] is not system.schur or not np.array_equal(known[1], free):
             flat = self.components.ravel()
             inside = np.flatnonzero(flat >= 0)
-            _, star = system.cholesky.reduced(flat[inside])
-            # a component that a support holds: its jump is zero
-            k = np.diag(np.full(len(flat), np.diagonal(star).mean()))
-            k[np.ix_(inside, inside)] = star
-            self._stiffness = known = system.schur, free.copy(), k
-        return ContactBlock(known[2], self.gap, self.mu)
+            _, k = system.cholesky.reduced(flat[inside])
+            if len(inside) < len(flat):
+                # a component that a support holds: its jump is zero
+                star, k = k, np.diag(np.full(len(flat), np.diagonal(k).mean()))
+                k[np.ix_(inside, inside)] = star
+            self._block = known = system.schur, free.copy(), ContactBlock(k, self.gap, self.mu)
+        return known[2]
 
     def load(self, system: LinearJumps, loads: Array, force: Array) -> Array:
         """G at loads and given forces, shape (m d,)."""
         flat = self.components.ravel()
         inside = np.flatnonzero(flat >= 0)
-        still = system.linear(loads, force, np.zeros(system.n_window))
+        rows, free = flat[inside], system.cholesky.free
+        given = force[rows] - system.schur[np.ix_(rows, system.load_columns)] @ loads
+        if system.offset is not None:
+            given -= system.offset[rows]
+        if len(free):
+            still = system.linear(loads, force, np.zeros(system.n_window))
+            given -= system.schur[np.ix_(rows, free)] @ still.jump[free]
         out = np.zeros(len(flat))
-        out[inside] = force[flat[inside]] - system.forces(still, flat[inside])
+        out[inside] = given
         return out
 
     def traction(self, system: LinearJumps, state: Equilibrium) -> Array:
         """Contact forces on the slave side at a state, shape (m, d)."""
-        out = np.zeros(self.components.shape)
-        inside = self.components >= 0
-        rows = self.components[inside]
-        out[inside] = system.forces(state, rows) - state.force[rows]
-        return out
+        load = self.load(system, state.loads, state.force)
+        force = self.block(system).forces(self.of(state.jump), load)
+        return np.where(self.components >= 0, force, 0.0)
 
     def dissipation(self, system: LinearJumps, a: Equilibrium, b: Equilibrium) -> float:
         """Energy that friction takes on the way between two states, linear in between."""
@@ -230,7 +235,7 @@ class Friction:
         none = np.zeros(system.n_window)
         idle = np.zeros(len(loads))
         load = self.load(system, loads, force) - self.load(system, idle, none)
-        block = ContactBlock(self.block(system).stiffness, np.zeros(len(self.gap)), self.mu)
+        block = replace(self.block(system), gap=np.zeros(len(self.gap)), factored={})
         try:
             jump = jumps_of(block, load, self.states, np.zeros(self.reference.shape))
         except Sliding as error:

@@ -35,9 +35,9 @@ _NUDGE = 1e-3
 """Fraction of the way done by backward Euler where following gets stuck."""
 _SMALLEST = 1.0 / 128.0
 """Smallest increment in 3-D, as a fraction of the way."""
-_SPREAD = 0.05
+_SPREAD = 0.02
 """Where dissipation is small, the two ways to compute it may differ by this fraction of it."""
-_LEVEL = 1e-3
+_LEVEL = 1e-4
 """... or by this fraction of the energy of the block."""
 _LOST = 1e-7
 """Work of pressure on openings in an increment in 3-D, as a fraction of the energy of the block:

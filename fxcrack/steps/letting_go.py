@@ -12,6 +12,7 @@ from fxcrack.criteria import AmplitudeRelease, Ramp
 from fxcrack.criteria import Release as ReleaseLaw
 from fxcrack.errors import InputError
 from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.rubbing import taken_over
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -208,11 +209,18 @@ def still_pulling(ramps: Sequence[Letting], time: float, increment: int) -> list
 
 
 def bond_forces_of(model: CondensedModel, p: int, nodes: Ints) -> Array:
-    """Forces on the slave side of bonded nodes in jump components, shape (n, gdim)."""
+    """Forces on the slave side of bonded nodes in jump components, shape (n, gdim).
+
+    With friction, less what contact takes over at once.
+    """
     index = model.index[p][nodes]
     inside = (index >= 0) & ~model.system.free[np.maximum(index, 0)]
     force = np.zeros(index.shape)
     force[inside] = model.system.forces(model.state, index[inside])
+    pair = model.pairs[p]
+    if model.system.friction is not None and pair.interface.contact:
+        taken, _, _ = taken_over(model.system, pair, model.index[p], nodes, model.state)
+        force[inside] -= taken[inside]
     return force
 
 
