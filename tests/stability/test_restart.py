@@ -360,7 +360,13 @@ OTHERS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], fx.Static, str]] = 
 }
 
 
-@pytest.mark.parametrize("what", OTHERS)
+@pytest.mark.parametrize(
+    "what",
+    [
+        what if what in ("material", "step") else pytest.param(what, marks=pytest.mark.slow)
+        for what in OTHERS
+    ],
+)
 def test_another_scene_is_refused_and_named(
     what: str, comm: MPI.Intracomm, shared_path: Path
 ) -> None:
@@ -396,6 +402,16 @@ def test_functions_that_give_something_else_are_found_by_the_equilibrium(
     with pytest.raises(fx.InputError, match=r"the checkpoint does not fit.*amplitudes and load"):
         other.run(step, checkpoint=checkpoint, restart=True)
     other.close()
+
+
+def test_nonlinear_bodies_are_told_that_they_have_no_checkpoints(
+    comm: MPI.Intracomm, shared_path: Path
+) -> None:
+    step = fx.Static(until=fx.Releases(1))
+    scene = short(comm, effects=[fx.FiniteStrain()])
+    with pytest.raises(fx.InputError, match=r"kept of linear bodies only.*finite strain"):
+        scene.run(step, checkpoint=fx.Checkpoint(shared_path / "state.npz"))
+    scene.close()
 
 
 def test_without_a_checkpoint_a_restart_begins_and_rubbish_is_refused(
