@@ -60,7 +60,7 @@ def test_points_that_are_no_numbers_are_not_on_the_front() -> None:
 
 
 @given(points, positive)
-def test_the_cheapest_is_good_enough_and_nothing_good_enough_is_cheaper(
+def test_the_cheapest_is_good_enough_and_nothing_as_good_is_faster_than_noise(
     found: list[tuple[float, float]], target: float
 ) -> None:
     t, e = np.array(found).T
@@ -70,7 +70,13 @@ def test_the_cheapest_is_good_enough_and_nothing_good_enough_is_cheaper(
         assert not good.any()
     else:
         assert good[i]
-        assert t[i] == t[good].min()
+        assert t[i] <= 1.1 * t[good].min()  # within the noise the more accurate one
+
+
+def test_of_equals_the_plainer_one_is_advised() -> None:
+    assert cheapest([1.0, 0.95, 2.0], [0.01, 0.01, 0.001], 0.05) == 0
+    assert cheapest([1.0, 0.95, 2.0], [0.02, 0.01, 0.001], 0.05) == 1
+    assert cheapest([1.0, 0.8, 2.0], [0.01, 0.02, 0.001], 0.05) == 1
 
 
 def test_advice_names_the_cheapest_for_each_accuracy_or_says_that_none_reached_it() -> None:

@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 GAIN = 0.05
 """Share of the error that a dearer setting must save to be on the front."""
+NOISE = 0.1
+"""Share of a time that repeated measurements differ by."""
 TARGETS = (0.05, 0.01, 0.001)
 """Accuracies for which the cheapest setting is named."""
 
@@ -39,14 +41,21 @@ def pareto_front(seconds: npt.ArrayLike, errors: npt.ArrayLike, *, gain: float =
 def cheapest(seconds: npt.ArrayLike, errors: npt.ArrayLike, target: float) -> int | None:
     """Position of the fastest point with an error of at most ``target``; ``None`` if there is none.
 
+    Among points as fast within the noise of a measurement the most accurate counts, among those as
+    accurate the first.
+
     Args:
         seconds: Cost of each point, shape (n,).
-        errors: Error of each point, its uncertainty included, shape (n,).
+        errors: Error of each point, its uncertainty included, shape (n,); the plainest first.
         target: Largest error, relative.
     """
     t, e = np.asarray(seconds, dtype=float), np.asarray(errors, dtype=float)
-    good = np.flatnonzero((e <= target) & np.isfinite(t))
-    return int(good[np.argmin(t[good])]) if len(good) else None
+    good = (e <= target) & np.isfinite(t)
+    if not good.any():
+        return None
+    good &= t <= (1.0 + NOISE) * t[good].min()
+    good &= e <= (1.0 + GAIN) * e[good].min()
+    return int(np.argmax(good))
 
 
 def percent(share: float) -> str:

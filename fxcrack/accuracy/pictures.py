@@ -63,7 +63,7 @@ def error_figure(result: Result) -> Figure:
     settings = [Setting(**r["setting"]) for r in records]
     x = np.array([r["seconds"] for r in records])
     y = np.maximum([r["error"] for r in records], _FLOOR)
-    figure, ax = new_figure(8.6, 5.4)
+    figure, ax = new_figure(8.2, 5.1)
     _logarithmic(ax, "seconds from mesh to result", "error")
     good = np.isfinite(y)
     _limits(ax, x[good], y[good], left=0.3)
@@ -192,9 +192,9 @@ def _blur(ax: Axes, uncertainty: float) -> None:
     if uncertainty > low:
         ax.axhspan(low, uncertainty, color=LIGHT, alpha=0.6, linewidth=0.0, zorder=0)
         ax.annotate(
-            "the reference is not known better", (1.0, uncertainty),
-            xycoords=("axes fraction", "data"), xytext=(-4, -4), textcoords="offset points",
-            ha="right", va="top", fontsize=8.5, color=GREY,
+            "grey: the reference is not known better", (1.0, 0.0), xycoords="axes fraction",
+            xytext=(-4, 4), textcoords="offset points", ha="right", va="bottom", fontsize=8.5,
+            color=GREY,
         )  # fmt: skip
 
 

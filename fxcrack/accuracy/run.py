@@ -166,6 +166,8 @@ def assemble(study: Study, records: list[tuple[Setting, Result]], measure: str) 
     Raises:
         InputError: Nobody measured the quantity asked for.
     """
+    plainest = {setting: i for i, setting in enumerate(settings(study))}
+    records = sorted(records, key=lambda record: plainest[record[0]])
     values = [(setting, found["values"]) for setting, found in records]
     measured = sorted({name for _, v in values for name in v})
     if measure != "worst" and measure not in measured:
@@ -173,7 +175,7 @@ def assemble(study: Study, records: list[tuple[Setting, Result]], measure: str) 
             f"measure = '{measure}': this study measures {', '.join(measured)}; name one of them, "
             "or worst"
         )
-    theory = records[-1][1]["theory"]
+    theory = records[0][1]["theory"]
     known = reference(values, theory, study.steppings[0])
     if known is None:
         raise InputError(

@@ -63,7 +63,7 @@ def _elements(height: float, size: float) -> int:
     unit="mm",
 )
 def dcb(setting: Setting) -> Case:
-    """Load at a = 35, G at an opening of 1.5 at a = 30, crack length at an opening of 2.1."""
+    """Load at a = 35, G at a load of 60 at a = 30, crack length at an opening of 2.1."""
     from fxcrack.demos.dcb import ARMS, BEAM, G_IC
     from fxcrack.meshes.dcb import dcb_2d
 
@@ -83,12 +83,12 @@ def dcb(setting: Setting) -> Case:
         debonds=[Debond(bond, VCCT(GIc=G_IC, **setting.rate_options()))],
         options=setting.options(),
     )
-    opening, far = 1.5, 2.1
+    force, far = 60.0, 2.1
 
     def measure(history: History) -> Measured:
         rows = critical(history, "bond")
         first = rows[0]
-        rate = float(first["GI[bond]"]) * (0.5 * opening / float(first["u[pin_top.y]"])) ** 2
+        rate = float(first["GI[bond]"]) * (force / float(first["R[pin_top.y]"])) ** 2
         return Measured(
             load=along(rows, "a[bond]", 35.0, "R[pin_top.y]"),
             G=rate,
@@ -97,7 +97,7 @@ def dcb(setting: Setting) -> Case:
 
     beam = replace(BEAM, E=BEAM.E / (1.0 - 0.30**2 * BEAM.E22 / BEAM.E))
     ae = 30.0 + beam.chi * beam.h
-    rate = 9.0 * beam.E * beam.inertia * opening**2 / (4.0 * beam.b * ae**4)
+    rate = (force * ae) ** 2 / (beam.b * beam.E * beam.inertia)
     strength = np.sqrt(G_IC * beam.b * beam.E * beam.inertia)
     length = np.sqrt(1.5 * beam.E * beam.inertia * far / strength) - beam.chi * beam.h
     theory = Measured(
