@@ -213,6 +213,14 @@ class Monitor:
     direction: tuple[float, ...]
     name: str | None = None
 
+    def __post_init__(self) -> None:
+        """Refuse a direction that is none."""
+        if not (np.all(np.isfinite(self.direction)) and np.any(self.direction)):
+            raise InputError(
+                f"Monitor('{self.where}'): direction = {self.direction} must hold finite numbers, "
+                "not all of them zero"
+            )
+
     @property
     def title(self) -> str:
         """Name in the history."""

@@ -98,6 +98,8 @@ class Orthotropic:
                 "(compliance not positive definite); check the order nu12, nu13, nu23"
             )
         axis1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
+        if not np.all(np.isfinite(self.frame)):
+            raise InputError(f"Orthotropic: frame = {self.frame} must hold finite numbers")
         if np.linalg.norm(np.cross(axis1, in_plane)) < 1e-8 * np.linalg.norm(axis1) * max(
             float(np.linalg.norm(in_plane)), 1e-300
         ):

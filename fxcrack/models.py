@@ -28,8 +28,10 @@ class _Plane:
     stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "xy")
 
     def __post_init__(self) -> None:
-        if not self.thickness > 0.0:
-            raise InputError(f"{type(self).__name__}: thickness = {self.thickness} is not positive")
+        if not 0.0 < self.thickness < np.inf:
+            raise InputError(
+                f"{type(self).__name__}: thickness = {self.thickness} is not positive and finite"
+            )
 
     def strain(self, u: Any, x: Any) -> Any:
         """Voigt strain (xx, yy, xy) of a UFL displacement."""

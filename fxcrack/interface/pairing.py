@@ -66,6 +66,11 @@ class Interface:
                 f"interface '{self.slave}' pairs a surface with itself; self-contact is not "
                 "possible here: name two distinct facet groups"
             )
+        if self.tolerance is not None and not 0.0 < self.tolerance < np.inf:
+            raise InterfaceError(
+                f"interface '{self.title}': tolerance = {self.tolerance} must be positive and "
+                "finite; None takes a tenth of the facet size"
+            )
         if self.gap not in ("adjust", "keep"):
             raise InterfaceError(f"gap = '{self.gap}': choose 'adjust' or 'keep'")
         self._check_friction()
@@ -226,6 +231,8 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
             f"{where}: bonded gives shape {marks.shape}; one boolean for each of the "
             f"{surface.n_nodes} slave nodes is needed"
         )
+    if not np.all(np.isfinite(marks)):
+        raise InterfaceError(f"{where}: bonded gives NaN or infinity; return booleans")
     return marks.astype(bool)
 
 
@@ -247,7 +254,9 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
         )
     bonded = bonded_nodes(interface, slave, continuum)
     foot = project(slave.x, master)
-    tolerance = interface.tolerance or 0.1 * master.facet_size
+    tolerance = interface.tolerance
+    if tolerance is None:
+        tolerance = 0.1 * master.facet_size
     paired = foot.distance <= tolerance
     lost = bonded & ~paired
     if np.any(lost):

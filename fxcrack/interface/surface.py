@@ -16,9 +16,13 @@ import numpy.typing as npt
 from fxcrack import compat
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InterfaceError, agree
+from fxcrack.mesh.raw import place
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+_FLAT = 1e-10
+"""Facets smaller than this fraction of the others have no length."""
 
 
 @lru_cache(maxsize=16)
@@ -236,7 +240,7 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
     position[rank] = points.reshape(-1, 3)[first]
     node_dofs = np.empty(len(unique), dtype=np.int64)
     node_dofs[rank] = unique
-    return FacetSurface(
+    surface = FacetSurface(
         name=name,
         kind=kind,
         order=continuum.order,
@@ -246,3 +250,23 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
         inner=inner,
         breadth=continuum.model.breadth(position),
     )
+    _check_facets(surface)
+    return surface
+
+
+def _check_facets(surface: FacetSurface) -> None:
+    """Refuse facets without length or area: no crack can tell how far it has run over them.
+
+    Raises:
+        InterfaceError: Says where the first one is.
+    """
+    xi, _ = basix.make_quadrature(getattr(basix.CellType, surface.kind), 2 * surface.order)
+    _, size = surface.facet_normals(np.asarray(xi))
+    least = size.min(axis=1)
+    flat = np.flatnonzero(~(least > _FLAT * np.median(least)))
+    if len(flat):
+        where = place(surface.x[surface.facets[flat[0]]].mean(axis=0))
+        raise InterfaceError(
+            f"facet group '{surface.name}' has {len(flat)} facets without length or area, the "
+            f"first at {where}; merge their nodes or mesh the surface again"
+        )

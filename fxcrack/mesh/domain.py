@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from fxcrack.errors import MeshError, agree
 from fxcrack.mesh.mesh import Group, Mesh
+from fxcrack.mesh.raw import RawMesh, check_shapes
 
 Marker = Callable[[npt.NDArray[np.float64]], npt.NDArray[np.bool_]]
 
@@ -51,6 +52,8 @@ def mesh_from_domain(
         problem = "the ranks name different groups; pass the same names and dimensions on each"
     agree(comm, _headed(name, problem), MeshError)
 
+    agree(comm, _headed(name, _geometry_fault(domain)), MeshError)
+
     found: dict[str, Group] = {}
     for key, (dim, choice) in groups.items():
         domain.topology.create_entities(dim)
@@ -68,6 +71,20 @@ def mesh_from_domain(
 def _headed(name: str, problem: str | None) -> str | None:
     """The problem with the mesh it is about."""
     return problem and f"mesh '{name}': {problem}"
+
+
+def _geometry_fault(domain: dolfinx.mesh.Mesh) -> str | None:
+    """What is wrong with the nodes and cells of this rank."""
+    geometry, cells = domain.geometry, compat.geometry_dofmap(domain)
+    if geometry.dim != domain.topology.dim or not len(cells):
+        return None
+    cell, order = domain.topology.cell_name(), int(geometry.cmap.degree)
+    raw = RawMesh(cell, order, geometry.x[:, : geometry.dim], np.asarray(cells, np.int64))
+    try:
+        check_shapes(raw)
+    except MeshError as error:
+        return str(error)
+    return None
 
 
 def _fault(

@@ -21,7 +21,7 @@ from petsc4py import PETSc
 
 from fxcrack import compat
 from fxcrack.continuum import Continuum
-from fxcrack.errors import InputError, SolverError
+from fxcrack.errors import InputError, SolverError, agree
 from fxcrack.interface.jumps import JumpCoordinates
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve.petsc_schur import (
@@ -63,6 +63,9 @@ def border_vectors(
     out = []
     for load in loads:
         vector = continuum.load_vector(load)
+        good = np.all(np.isfinite(vector.array_r))
+        bad = f"load '{load.title}' is not a finite number everywhere; mend its value"
+        agree(continuum.comm, None if good else bad)
         vector.scale(-1.0)
         out.append(vector)
     for monitor in monitors:

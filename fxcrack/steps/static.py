@@ -51,6 +51,8 @@ class Static:
             )
         if not (self.growth >= 1.0 and 0.0 < self.cutback < 1.0 and self.max_cutbacks >= 0):
             raise InputError("growth must be >= 1, cutback between 0 and 1, max_cutbacks >= 0")
+        if not self.max_increments >= 1:
+            raise InputError(f"max_increments = {self.max_increments}: allow at least one")
         if self.linear_scaling is not None and not 0.0 < self.linear_scaling < 1.0:
             raise InputError(
                 f"linear_scaling = {self.linear_scaling} must lie between 0 and 1; 0.9 is usual"

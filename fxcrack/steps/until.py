@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 from fxcrack.errors import InputError
@@ -16,8 +17,8 @@ class Time:
 
     def __post_init__(self) -> None:
         """Refuse a time that is not after the start."""
-        if not self.time > 0.0:
-            raise InputError(f"Time({self.time}): the end time must be positive")
+        if not 0.0 < self.time < math.inf:
+            raise InputError(f"Time({self.time}): the end time must be positive and finite")
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +28,22 @@ class CrackLength:
     interface: Interface
     length: float
 
+    def __post_init__(self) -> None:
+        """Refuse a length no crack can be compared with."""
+        if not math.isfinite(self.length):
+            raise InputError(f"CrackLength({self.length}): the length must be a finite number")
+
 
 @dataclass(frozen=True)
 class Releases:
     """Stop after this many released nodes, over all interfaces."""
 
     count: int
+
+    def __post_init__(self) -> None:
+        """Refuse a number that is none."""
+        if not self.count >= 1:
+            raise InputError(f"Releases({self.count}): at least one node must be released")
 
 
 Until = Time | CrackLength | Releases
