@@ -78,7 +78,7 @@ def _geometry_fault(domain: dolfinx.mesh.Mesh) -> str | None:
     geometry, cells = domain.geometry, compat.geometry_dofmap(domain)
     if geometry.dim != domain.topology.dim or not len(cells):
         return None
-    cell, order = domain.topology.cell_name(), int(geometry.cmap.degree)
+    cell, order = domain.topology.cell_name(), int(compat.coordinate_map(domain).degree)
     raw = RawMesh(cell, order, geometry.x[:, : geometry.dim], np.asarray(cells, np.int64))
     try:
         check_shapes(raw)
