@@ -199,6 +199,29 @@ def test_the_nonlinear_path_gives_the_same(comm: MPI.Intracomm) -> None:
         assert last[1] == pytest.approx(last[0], rel=1e-8)  # asked for by the issue
 
 
+def test_slips_are_committed_in_the_jumps_of_a_renewed_pairing() -> None:
+    scene = pulled(MPI.COMM_SELF, 2, effects=[fx.FiniteStrain()])
+    model, renewals, renew = scene.model, [], scene.model.renew_pairs  # type: ignore[attr-defined]
+
+    def watched() -> bool:
+        changed = bool(renew())
+        if changed:
+            friction = model.system.friction
+            assert friction is not None
+            now = friction.of(model.state.jump)[:, 1:]
+            assert friction.reference == pytest.approx(now, abs=1e-15)
+            renewals.append(np.abs(now).max())
+        return changed
+
+    model.renew_pairs = watched  # type: ignore[attr-defined]
+    history = scene.run(
+        fx.Static(until=fx.Time(2.0), stepping="increment", initial=0.05, maximum=0.05)
+    )
+    assert renewals and max(renewals) > 0.0
+    # the pull at small strain is mu W = 6; the block is strained by 1 %
+    assert history.rows[-1]["R[pull.x]"] == pytest.approx(6.0, rel=0.03)
+
+
 # -- line contact --------------------------------------------------------------------------
 
 E, NU, RADIUS, MU_LINE = 1000.0, 0.3, 50.0, 0.4

@@ -527,6 +527,9 @@ class NewtonModel(CondensedModel):
             both = (before >= 0) & (now >= 0)
             force[now[both]] = old.force[before[both]]
         self.state = Equilibrium(old.loads, force, self._base.copy(), old.conjugate)
+        if self.system.friction is not None:
+            # slips so far, in the jumps of the present pairing
+            self.system.friction.commit(self._base)
 
     # -- energies and fields -------------------------------------------------------------
 
