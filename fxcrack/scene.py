@@ -136,6 +136,8 @@ class Scene:
     def _breaks(self) -> tuple[float, ...]:
         moving = [c.support.amplitude for c in self.supports.columns if c.moves]
         every = moving + [load.amplitude for load in self.loads]
+        if self.continuum.temperature is not None:
+            every += self.continuum.temperature.amplitudes
         return tuple(sorted({b for a in every for b in a.breaks()}))
 
     def run(

@@ -93,15 +93,17 @@ class TemperatureField:
 
     def nodal(self, space: fem.FunctionSpace, time: float) -> Array:
         """Temperature at the local nodes of a (vector) Lagrange space, owned first, shape (n,)."""
-        n = space.dofmap.index_map_bs
-        out = np.full(len(fem.Function(space).x.array) // n, self.effect.reference)
-        for field, amplitude in self.effect.patterns():
-            factor = amplitude(time)
-            if factor != 0.0:
-                values = fem.Function(space)
-                _interpolate(values, field, self.effect.reference)
-                out += factor * values.x.array[::n]
-        return out
+        factors = np.array([a(time) for a in self.amplitudes])
+        return np.asarray(self.effect.reference + factors @ self.nodal_patterns(space))
+
+    def nodal_patterns(self, space: fem.FunctionSpace) -> Array:
+        """Patterns at the local nodes of a (vector) Lagrange space, shape (n_patterns, n)."""
+        out = []
+        for field, _ in self.effect.patterns():
+            values = fem.Function(space)
+            _interpolate(values, field, self.effect.reference)
+            out.append(values.x.array[:: space.dofmap.index_map_bs].copy())
+        return np.array(out)
 
 
 def _interpolate(out: fem.Function, field: Spatial, reference: float) -> None:

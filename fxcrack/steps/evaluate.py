@@ -25,6 +25,7 @@ from fxcrack.criteria.vcct import closure_weights, weighted_rates
 from fxcrack.interface.front import Tips
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.steps.interface_temperature import InterfaceTemperature
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -88,7 +89,7 @@ class RateEvaluator:
         model: Condensed model.
         p: Number of the pair.
         criterion: Criterion with toughness and mode mix.
-        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
+        temperature: Temperature of the slave nodes; None without.
     """
 
     degree = 2
@@ -100,23 +101,26 @@ class RateEvaluator:
         model: CondensedModel,
         p: int,
         criterion: RateCriterion,
-        temperature: Array | None = None,
+        temperature: InterfaceTemperature | None = None,
     ) -> None:
         self.model = model
         self.p = p
         self.criterion = criterion
         self._weighed: Tips | None = None
         self._weights = np.zeros((0, 1))
-        surface = model.fronts[p].surface
+        surface = model.pairs[p].surface
         criterion.check_slaves(surface.n_nodes)
         x = surface.x[:, : model.continuum.gdim]
         self._temperature = temperature
-        self.toughness = criterion.toughness_at(
-            x, np.arange(len(x)), self._temperature, n_slave=len(x)
-        )
+        self._moving = temperature is not None and not temperature.steady
+        at_start = None if temperature is None else temperature(0.0)
+        self.toughness = criterion.toughness_at(x, np.arange(len(x)), at_start, n_slave=len(x))
 
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
-        """Tip forces and the openings they are multiplied with, shape (n, 6 k)."""
+        """Tip forces and the openings they are multiplied with, shape (n, 6 k).
+
+        A last column holds the temperature of the tips where it changes in time.
+        """
         force = self.model.bond_forces(self.p, tips, state)
         if self.criterion.method == "closure":
             opening = self.model.closure_jumps(self.p, tips, force)
@@ -126,12 +130,17 @@ class RateEvaluator:
                 # on a ring the midside force belongs to its own circumference
                 breadth = self.model.fronts[self.p].surface.breadth
                 force[:, 1] *= (breadth[tips.node] / breadth[tips.force_nodes[:, 1]])[:, None]
-        return np.concatenate([force.reshape(len(tips), -1), opening.reshape(len(tips), -1)], 1)
+        columns = [force.reshape(len(tips), -1), opening.reshape(len(tips), -1)]
+        if self._moving and self._temperature is not None:
+            columns.append(self._temperature(time)[tips.node, None])
+        return np.concatenate(columns, 1)
 
     def rates(self, tips: Tips, measured: Array) -> Array:
         """Energy release rates by mode, shape (n, 3), force/length."""
         half = measured.shape[1] // 2
-        force, opening = (m.reshape(len(tips), -1, 3) for m in np.split(measured, [half], axis=1))
+        force, opening = (
+            m.reshape(len(tips), -1, 3) for m in (measured[:, :half], measured[:, half : 2 * half])
+        )
         if self.criterion.method == "closure":
             return closure_rates(force, opening, tips.area)
         if tips is not self._weighed:
@@ -143,8 +152,23 @@ class RateEvaluator:
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and GI, GII, GIII."""
         rates = self.rates(tips, measured)
-        f = self.criterion.ratio(rates, self.toughness[tips.node])
+        f = self.criterion.ratio(rates, self._toughness(tips, measured))
         return f, dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+
+    def _tip_temperature(self, tips: Tips, measured: Array | None) -> Array | None:
+        if self._temperature is None:
+            return None
+        if self._moving and measured is not None:
+            return measured[:, -1]
+        return self._temperature(0.0)[tips.node]
+
+    def _toughness(self, tips: Tips, measured: Array | None) -> Array:
+        """Toughness by mode at the tips, shape (n, 3), force/length."""
+        if not self._moving or measured is None:
+            return self.toughness[tips.node]
+        surface = self.model.pairs[self.p].surface
+        x = surface.x[tips.node, : self.model.continuum.gdim]
+        return self.criterion.toughness_at(x, tips.node, measured[:, -1], n_slave=surface.n_nodes)
 
     def energy_to_spend(self, nodes: Ints, values: TipValues, release: Release) -> Array:
         """Energy that softening nodes dissipate until they are free, shape (n,).
@@ -154,12 +178,12 @@ class RateEvaluator:
         surface = self.model.fronts[self.p].surface
         tips = values.tips
         rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
-        toughness = self.toughness[tips.node]
+        toughness = self._toughness(tips, values.measured)
         if isinstance(self.criterion, EnhancedVCCT):
             toughness = self.criterion.propagation_toughness_at(
-                surface.x[tips.node, : self.model.continuum.gdim],
+                self.model.pairs[self.p].surface.x[tips.node, : self.model.continuum.gdim],
                 tips.node,
-                None if self._temperature is None else self._temperature[tips.node],
+                self._tip_temperature(tips, values.measured),
                 n_slave=surface.n_nodes,
             )
         critical = self.criterion.critical(rates, toughness)
@@ -199,8 +223,8 @@ class RateEvaluator:
         return np.zeros(0, dtype=np.int64)
 
     def breaks(self) -> tuple[float, ...]:
-        """Rates do not depend on time as such."""
-        return ()
+        """Rates do not depend on time as such; a temperature does."""
+        return self._temperature.breaks() if self._temperature is not None else ()
 
 
 _ROUND_OFF = 1e-13

@@ -17,18 +17,19 @@ from fxcrack.criteria import (
     RateCriterion,
     Release,
     Step,
+    Tabulated,
 )
 from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Tips
 from fxcrack.interface.pairing import Interface, Pair
 from fxcrack.interface.path import SurfacePaths
-from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
 from fxcrack.steps.evaluate_distance import OpeningEvaluator, StressEvaluator
 from fxcrack.steps.evaluate_length import LengthEvaluator
+from fxcrack.steps.interface_temperature import given_temperature, scene_temperature
 from fxcrack.steps.records import ReleaseRecord, release_records
 
 Array = npt.NDArray[np.float64]
@@ -218,36 +219,21 @@ def make_evaluator(
     Raises:
         InputError: The criterion does not fit the interface, or a temperature is missing or wrong.
     """
-    at_nodes = temperature_at_nodes(model, p, temperature)
-    if isinstance(criterion, CriticalStress):
-        return StressEvaluator(model, p, criterion, at_nodes)
-    if isinstance(criterion, CrackOpening):
-        return OpeningEvaluator(model, p, criterion, at_nodes)
+    pair, continuum = model.pairs[p], model.continuum
+    known = given_temperature(pair, continuum.gdim, temperature)
+    if known is None and any(isinstance(v, Tabulated) for v in vars(criterion).values()):
+        known = scene_temperature(pair, continuum)
     if isinstance(criterion, CrackLengthVsTime):
         return LengthEvaluator(model, p, criterion)
-    return RateEvaluator(model, p, criterion, at_nodes)
-
-
-def temperature_at_nodes(
-    model: CondensedModel, p: int, temperature: float | Callable[[Array], npt.ArrayLike] | None
-) -> Array | None:
-    """Temperature of the slave nodes, shape (n_nodes,); None without.
-
-    Raises:
-        InputError: The function returned another shape, or a temperature is not finite.
-    """
-    if temperature is None:
-        return None
-    x = model.fronts[p].surface.x[:, : model.continuum.gdim]
-    where = f"interface '{model.pairs[p].title}'"
-    given = np.asarray(temperature(x) if callable(temperature) else temperature, dtype=float)
-    if given.shape not in ((), (len(x),)):
+    if not isinstance(criterion, CriticalStress | CrackOpening):
+        return RateEvaluator(model, p, criterion, known)
+    if known is not None and not known.steady:
         raise InputError(
-            f"{where}: temperature gives shape {given.shape} for positions of shape {x.shape}; one "
-            "number per slave node is needed (the first coordinate is x[:, 0])"
+            f"interface '{pair.title}': {type(criterion).__name__} cannot follow a temperature "
+            "that changes in time; give Debond(temperature=...), or a criterion by energy release "
+            "rates"
         )
-    values = np.broadcast_to(given, (len(x),))
-    if not np.isfinite(values).all():
-        i = int(np.argmin(np.isfinite(values)))
-        raise InputError(f"{where}: temperature is {values[i]} at {place(x[i])}; give a number")
-    return values
+    at_nodes = None if known is None else known(0.0)
+    if isinstance(criterion, CriticalStress):
+        return StressEvaluator(model, p, criterion, at_nodes)
+    return OpeningEvaluator(model, p, criterion, at_nodes)

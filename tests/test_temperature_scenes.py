@@ -1,0 +1,99 @@
+"""Temperature in scenes: toughness that follows it, loads from the first moment, both paths."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from specimens import bond, column, largest_imbalance, onsets
+
+import fxcrack as fx
+from fxcrack.meshes.dcb import dcb_2d
+
+HEATED = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 0.0, 1.0))
+HELD = fx.Amplitude((0.0, 1.0), (0.0, 1.0))
+TOUGHNESS = fx.Tabulated([20.0, 120.0], [0.2, 0.05])
+
+
+def heated_dcb(comm: MPI.Intracomm, path: str | None) -> fx.Scene:
+    """Opened until time 1, then heated from 20 to 120 degrees; nothing expands."""
+    return fx.Scene(
+        dcb_2d(comm, dx=2.0, ny=2),
+        materials=fx.Isotropic(70e3, 0.3),
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("pin_top", x=0.0, y=0.7, amplitude=HELD),
+            fx.Displacement("pin_bottom", x=0.0, y=-0.7, amplitude=HELD),
+        ],
+        debonds=[fx.Debond(bond(30.0), fx.VCCT(GIc=TOUGHNESS))],
+        effects=[fx.Temperature(120.0, reference=20.0, amplitude=HEATED)],
+        path=path,
+    )
+
+
+@pytest.mark.mpi
+def test_toughness_follows_the_temperature_of_the_bodies(comm: MPI.Intracomm) -> None:
+    scene = heated_dcb(comm, None)
+    history = scene.run(fx.Static(until=fx.Time(2.0)))
+    first = onsets(history)
+    assert len(first) >= 2
+    heat = np.interp(column(first, "time"), (1.0, 2.0), (20.0, 120.0))
+    critical = np.interp(heat, (20.0, 120.0), (0.2, 0.05))
+    # f = 1 is located to round-off on linear pieces
+    assert column(first, "GI[bond]") == pytest.approx(critical, rel=1e-10)
+    # the specimen stands still while it warms up: the first onset is where the table says
+    at_rest = first[0]["GI[bond]"]
+    assert first[0]["time"] == pytest.approx(1.0 + (0.2 - at_rest) / 0.15, rel=1e-12)
+
+
+def test_toughness_follows_the_temperature_on_the_nonlinear_path(comm: MPI.Intracomm) -> None:
+    one, other = (heated_dcb(comm, p).run(fx.Static(until=fx.Time(2.0))) for p in (None, "newton"))
+    a, b = column(onsets(one), "time"), column(onsets(other), "time")
+    # f = 1 is met to 1e-9 there
+    assert b == pytest.approx(a, rel=1e-8)
+
+
+@pytest.mark.parametrize("path", [None, "newton"])
+def test_a_steady_temperature_loads_the_bodies_at_once(path: str | None) -> None:
+    steel, other = (fx.Isotropic(200e3, 0.3, expansion=a) for a in (1e-5, 2e-5))
+    scene = fx.Scene(
+        dcb_2d(dx=2.0, ny=2),
+        materials={"upper": steel, "lower": other},
+        model=fx.PlaneStrain(),
+        supports=[fx.Displacement("pin_bottom", x=0.0, y=0.0), fx.Displacement("far_lower", x=0.0)],
+        debonds=[fx.Debond(bond(30.0), fx.VCCT(GIc=1e3))],
+        effects=[fx.Temperature(-100.0, amplitude=fx.Amplitude((0.0,), (1.0,)))],
+        path=path,
+    )
+    history = scene.run(fx.Static(until=fx.Time(1.0)))
+    assert history["GI[bond]"][0] + history["GII[bond]"][0] > 0.0
+    assert history["strain_energy"][0] > 0.0
+    assert history["strain_energy"][-1] == pytest.approx(history["strain_energy"][0], rel=1e-12)
+    assert largest_imbalance(history) < 1e-9  # the iteration ends at 1e-10 of the forces
+
+
+def test_cooling_on_both_paths() -> None:
+    def run(path: str | None) -> fx.History:
+        scene = fx.Scene(
+            dcb_2d(dx=2.0, ny=2),
+            materials={
+                "upper": fx.Isotropic(70e3, 0.3, expansion=2e-5),
+                "lower": fx.Isotropic(200e3, 0.3, expansion=1e-5),
+            },
+            model=fx.PlaneStrain(),
+            supports=[
+                fx.Displacement("pin_bottom", x=0.0, y=0.0),
+                fx.Displacement("far_lower", x=0.0),
+            ],
+            debonds=[fx.Debond(bond(30.0), fx.VCCT(GIc=1e3))],
+            effects=[fx.Temperature([(0.0, 0.0), (1.0, -100.0), (2.0, -50.0)])],
+            path=path,
+        )
+        return scene.run(
+            fx.Static(until=fx.Time(2.0), stepping="increment", initial=0.25, maximum=0.25)
+        )
+
+    one, other = run(None), run("newton")
+    for name in ("GI[bond]", "GII[bond]", "strain_energy", "external_work"):
+        assert other[name] == pytest.approx(one[name], rel=1e-8, abs=1e-8 * np.abs(one[name]).max())
+    assert largest_imbalance(one) < 1e-10 and largest_imbalance(other) < 1e-8
