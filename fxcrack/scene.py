@@ -21,6 +21,7 @@ from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
 from fxcrack.models import Model
 from fxcrack.output.checkpoint import Checkpoint
+from fxcrack.output.explain import Explanation, explain
 from fxcrack.output.history import History, Row
 from fxcrack.output.progress import Progress
 from fxcrack.solve.condensed import CondensedModel, CondensedOptions
@@ -302,6 +303,16 @@ class Scene:
                             ahead *= 1.1
                         out[g.p] = max(ahead, 0.0) + 2.5 * size
         return out
+
+    def explain(self) -> Explanation:
+        """Print which effects are on, how the scene is solved and why, and what it has cost.
+
+        Collective; returns what it prints.
+        """
+        found = explain(self)
+        if self.mesh.comm.rank == 0:
+            print(found)
+        return found
 
     def close(self) -> None:
         """Free all PETSc objects; collective. The history stays."""

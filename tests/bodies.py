@@ -230,6 +230,6 @@ def uniform(gradient: npt.ArrayLike) -> Callable[[Array], Array]:
 
 def newton_order(norms: Sequence[float]) -> float:
     """Order of convergence at the end of an iteration, above round-off."""
-    seen = np.log([n for n in norms if n > 1e-14 * max(norms)])
+    seen = np.log([n for n in norms if n > 1e-13 * max(norms)])
     orders = (seen[2:] - seen[1:-1]) / (seen[1:-1] - seen[:-2])
     return float(orders[-2:].max())

@@ -100,6 +100,7 @@ class CondensedModel:
         columns: Columns computed by iteration, ``None`` where the bodies are factored.
         timings: Seconds per phase and number of factorisations.
         linear: Whether the bodies are, so that S outlives an increment.
+        law_seconds: Seconds per law of the interface (contact, friction, softening).
     """
 
     linear = True
@@ -120,6 +121,7 @@ class CondensedModel:
         self.monitors = monitors
         self.options = options
         self.timings = Timings()
+        self.law_seconds: dict[str, float] = {}
         self.fronts = [Front(p.surface, p.bonded, p.title) for p in pairs]
         self.n_loads = len(supports.columns) + len(loads)
         self.active = [False] * len(pairs)
@@ -199,6 +201,7 @@ class CondensedModel:
         for front, held in zip(self.fronts, coordinates.held, strict=True):
             front.tied = held.all(axis=1)
         self._condense(coordinates)
+        self.system.seconds = self.law_seconds
         start = time.perf_counter()
         self._restore_states()
         self.timings.add("march", start)

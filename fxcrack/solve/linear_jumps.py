@@ -84,6 +84,7 @@ class LinearJumps:
         touches: Normal components that may be in contact once their bond is gone, likewise.
         gap: Initial gaps, shape (n_window,), length.
         contact_steps: Number of active-set steps done.
+        seconds: Time spent following contact, friction or softening, by law.
     """
 
     def __init__(
@@ -110,6 +111,7 @@ class LinearJumps:
         self.touches = np.zeros(n_window, dtype=bool)
         self.gap = np.zeros(n_window)
         self.contact_steps = 0
+        self.seconds: dict[str, float] = {}
         self.cholesky = GrowingCholesky(schur)
         self.soft = SoftSet(schur)
         # the offset is one more load whose factor is 1
