@@ -23,6 +23,7 @@ from fxcrack.criteria import (
 from fxcrack.criteria.mixed_mode import total
 from fxcrack.criteria.vcct import closure_weights, weighted_rates
 from fxcrack.interface.front import Tips
+from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.interface_temperature import InterfaceTemperature
@@ -174,6 +175,9 @@ class RateEvaluator:
         """Energy that softening nodes dissipate until they are free, shape (n,).
 
         Each unit spends what its area asks for; 0 at nodes that have no part in it.
+
+        Raises:
+            NotPositiveDefinite: A body would come free: without bound is what its last unit frees.
         """
         surface = self.model.fronts[self.p].surface
         tips = values.tips
@@ -190,6 +194,8 @@ class RateEvaluator:
         if isinstance(release, Ramp) and not isinstance(self.criterion, EnhancedVCCT):
             # 1/2 F0 w_c with the opening of the wake: what crack closure calls G A
             critical = total(rates)
+        if np.any(critical > UNBOUNDED_RATE * toughness[:, 0]):
+            raise NotPositiveDefinite(int(tips.node[np.argmax(critical)]))
         out = np.zeros(len(nodes))
         for unit, rate, shares in zip(
             tips.force_nodes, critical, self._shares(values), strict=True
@@ -208,7 +214,9 @@ class RateEvaluator:
         tips, measured = values.tips, values.measured
         assert measured is not None
         n, k = tips.force_nodes.shape
-        force, opening = (m.reshape(n, k, 3) for m in np.split(measured, 2, axis=1))
+        force, opening = (
+            m.reshape(n, k, 3) for m in (measured[:, : 3 * k], measured[:, 3 * k : 6 * k])
+        )
         products = force * opening
         products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)
         spent = np.maximum(products.sum(axis=2), 0.0)
@@ -227,6 +235,8 @@ class RateEvaluator:
         return self._temperature.breaks() if self._temperature is not None else ()
 
 
+UNBOUNDED_RATE = 1e50
+"""Rates beyond this multiple of the toughness belong to units that hold a body alone."""
 _ROUND_OFF = 1e-13
 """Differences below this fraction of the largest value do not make a path bend."""
 
