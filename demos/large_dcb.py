@@ -1,8 +1,7 @@
 # # Double cantilever beam with large rotations
 #
 # Two thin spring-steel strips, glued together beyond a0 = 40 mm with a tough adhesive, are peeled
-# apart. Before the crack grows each arm has bent by more than a third of its length, and
-# the load is
+# apart. Before the crack grows each arm has bent by more than a third of its length, and the load is
 # far above the one of a linear analysis. Units N, mm, MPa; plane strain, E' = E/(1 - nu^2).
 #
 # An arm is an elastica of length L = a + chi h, clamped at the crack tip, with a force P that keeps
@@ -12,9 +11,9 @@
 #     L = sqrt(E' I/2P) int_0^t0 dt/sqrt(sin t0 - sin t),
 #     w = sqrt(E' I/2P) int_0^t0 sin t dt/sqrt(sin t0 - sin t).
 #
-# The left side of the first line and P sin t make up a constant along the arm. It is what the
-# energy changes by per length of arm: at the root, where t = 0, the bending energy per length, at
-# the end the load times the sine of the slope. So for both arms
+# The left side of the first line and P sin t make up a constant along the arm. It is what the energy
+# changes by per length of arm: at the root, where t = 0, the bending energy per length, at the end
+# the load times the sine of the slope. So for both arms
 #
 #     G = M_root^2/(b E' I) = 2 P sin(t0)/b.
 #
@@ -27,6 +26,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -81,7 +81,7 @@ def at_growth(a: float) -> tuple[float, float]:
 #
 # The pins sit on the middle line of the arms and move across only; the far end is held. Turning
 # elements are slender: second order bends them well.
-def strips(dx: float, ny: int, until: float) -> fx.Mesh:
+def strips(dx: float, ny: int, until: float, comm: MPI.Intracomm) -> fx.Mesh:
     """Both strips, with pins at mid-height and the corners that tell the slope of the end."""
 
     def make() -> Blocks:
@@ -93,18 +93,23 @@ def strips(dx: float, ny: int, until: float) -> fx.Mesh:
         model.group("inner", upper.part(x=0.0, y=0.0))
         return model
 
-    return build(MPI.COMM_WORLD, "large_dcb", make, None)
+    return build(comm, "large_dcb", make, None)
 
 
 def make_scene(
-    dx: float = 0.5, ny: int = 2, until: float = 60.0, *, law: str = "St. Venant-Kirchhoff"
+    dx: float = 0.5,
+    ny: int = 2,
+    until: float = 60.0,
+    *,
+    law: str = "St. Venant-Kirchhoff",
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
 ) -> tuple[fx.Scene, fx.Interface]:
     """The specimen; the law is "linear", "St. Venant-Kirchhoff" or "neo-Hookean"."""
     bond = fx.Interface(
         slave="upper_face", master="lower_face", bonded=lambda x: x[0] >= A0 - 1e-9, name="bond"
     )
     scene = fx.Scene(
-        strips(dx, ny, until),
+        strips(dx, ny, until, comm),
         materials=fx.NeoHookean(E, NU) if law == "neo-Hookean" else fx.Isotropic(E, NU),
         model=fx.PlaneStrain(thickness=WIDTH),
         supports=[
@@ -124,10 +129,10 @@ def make_scene(
 
 
 def run(
-    dx: float = 0.5, ny: int = 2, until: float = 60.0, *, law: str = "St. Venant-Kirchhoff"
+    dx: float = 0.5, ny: int = 2, until: float = 60.0, **options: Any
 ) -> tuple[fx.Scene, Array]:
-    """Grow the crack; columns a, opening, load, G, 2 P sin(slope of the end)/b at each onset."""
-    scene, bond = make_scene(dx, ny, until, law=law)
+    """Grow the crack; options as above. Columns a, opening, load, G, 2 P sin(slope of the end)/b at each onset."""
+    scene, bond = make_scene(dx, ny, until, **options)
     history = scene.run(fx.Static(until=fx.CrackLength(bond, until), maximum=4.0))
     at = history["event"] == "onset"
     a, opening, load, rate, outer, inner = (
@@ -149,20 +154,20 @@ def main(out: Path, fine: bool = False) -> None:
     """Both analyses, the table, the curves and the deformed specimen."""
     size = (0.25, 4) if fine else (0.5, 2)
     scene, found = run(*size)
-    linear, _ = run(*size, law="linear")
+    linear, straight = run(*size, law="linear")
     rows = []
     for a, opening, load, rate, by_slope in found[:: max(1, len(found) // 5)]:
         exact, exact_rate = at_opening(a, opening)
         line = BEAM.dcb_load(a, 1.0) * opening / BEAM.dcb_opening(a, BEAM.dcb_load(a, 1.0))
         norm = line * corrections(a, opening)[0]
-        ratios = [load / exact, load / norm, load / line, rate / exact_rate, rate / by_slope]
-        rows.append([a, opening, load, *ratios])
+        rows.append(
+            [a, opening, load, load / exact, load / norm, load / line]
+            + [rate / exact_rate, rate / by_slope]
+        )
     table(
         "Load and G at the same crack length and opening",
-        [
-            *("a / mm", "opening / mm", "load / N", "load / elastica", "load / ISO 15024"),
-            *("load / linear", "G / elastica", "G b/(2 P sin t0)"),
-        ],
+        ["a / mm", "opening / mm", "load / N", "load / elastica", "load / ISO 15024"]
+        + ["load / linear", "G / elastica", "G b/(2 P sin t0)"],
         rows,
     )
     a = np.linspace(A0, found[-1, 0], 60)

@@ -264,18 +264,21 @@ class Continuum:
 
         That of the small strain, at the present temperature (``temperature.set(time)``).
         """
+        strain = self.model.strain(u, self.x)
+        return self.cell_means(
+            [(self.small_stress(i, strain), self.parts[i][2]) for i in range(len(self.parts))]
+        )
+
+    def cell_means(self, stresses: list[tuple[Any, Any]]) -> fem.Function:
+        """Cell averages of UFL stresses, one with its measure per part; collective."""
         n = len(self.model.stress_labels)
         element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
         space = fem.functionspace(self.mesh.domain, element)
         test = ufl.TestFunction(space)
-        strain = self.model.strain(u, self.x)
         volume = dolfinx.fem.petsc.assemble_vector(
             fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self.weight * ufl.dx)
         )
-        sigma = sum(
-            ufl.inner(self._stress(i, strain), test) * self.weight * self.parts[i][2]
-            for i in range(len(self.parts))
-        )
+        sigma = sum(ufl.inner(stress, test) * self.weight * dx for stress, dx in stresses)
         integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
         out = fem.Function(space, name="stress")
         local = len(volume.array)
@@ -285,7 +288,8 @@ class Continuum:
         integral.destroy()
         return out
 
-    def _stress(self, i: int, strain: Any) -> Any:
+    def small_stress(self, i: int, strain: Any) -> Any:
+        """All stresses (``model.stress_labels``) of a part at a small strain, UFL."""
         if self.temperature is None:
             return ufl.dot(self.parts[i][1], strain)
         from fxcrack.thermal import whole_stress

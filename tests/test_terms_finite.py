@@ -142,6 +142,10 @@ def test_uniaxial_neo_hookean(comm: MPI.Intracomm, stretch: float) -> None:
     density = mu / 2 * (stretch**2 + 2 * b2 - 3 - 2 * np.log(stretch * b2))
     density += lame / 2 * np.log(stretch * b2) ** 2
     assert bodies.stored()["strain_energy"] == pytest.approx(1.2 * density, rel=1e-9)
+    # Cauchy stress: the force on the deformed area
+    stress = bodies.stress().x.array.reshape(-1, 6)
+    expected = np.tile([nominal / b2, 0, 0, 0, 0, 0], (len(stress), 1))
+    assert stress == pytest.approx(expected, abs=1e-9 * abs(nominal))
     # quadratic convergence: the number of right digits doubles, until round-off
     assert newton_order(norms) > 1.7, norms
     bodies.destroy()
@@ -214,3 +218,33 @@ def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> Non
         place(bodies, u)
         bodies.destroy()
     assert results[0] == pytest.approx(results[1], rel=1e-12)  # sums in another order
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_stress_is_that_of_small_strain_when_small(comm: MPI.Intracomm, model: str) -> None:
+    for material in (CARBON, fx.NeoHookean(E, NU)):
+        if model == "plane stress" and isinstance(material, fx.NeoHookean):
+            continue
+        bodies = bodies_of(comm, model, material, 1)
+        u = wavy(bodies.continuum, 1e-6, 3)
+        place(bodies, u.x.array[: bodies.continuum.n_local])
+        small = bodies.continuum.stress(u).x.array
+        # strains and rotations of 1e-6, times stiffnesses of up to 140 that are not alike
+        assert np.abs(bodies.stress().x.array - small).max() < 1e-4 * np.abs(small).max()
+        bodies.destroy()
+
+
+def test_stress_turns_with_the_body(comm: MPI.Intracomm) -> None:
+    """Stretch and rotation: the second Piola-Kirchhoff stress of the stretch, turned."""
+    bodies = bodies_of(comm, "solid", fx.Isotropic(E, NU), 1)
+    c = bodies.continuum
+    q, stretch = turn(0.7), np.diag([1.2, 0.9, 1.1])
+    x = c.positions()[: c.n_local // 3]
+    place(bodies, (x @ (q @ stretch - np.eye(3)).T).ravel())
+    strain = np.append(0.5 * (np.diag(stretch) ** 2 - 1.0), [0.0, 0.0, 0.0])
+    second = np.diag((fx.Isotropic(E, NU).stiffness() @ strain)[:3])
+    cauchy = q @ stretch @ second @ stretch @ q.T / np.linalg.det(stretch)
+    expected = cauchy[[0, 1, 2, 1, 0, 0], [0, 1, 2, 2, 2, 1]]
+    stress = bodies.stress().x.array.reshape(-1, 6)
+    assert stress == pytest.approx(np.tile(expected, (len(stress), 1)), abs=1e-12 * E)
+    bodies.destroy()

@@ -99,6 +99,8 @@ def test_uniaxial(comm: MPI.Intracomm, model: str, material: fx.Plastic) -> None
         solve(bodies, held, values=lambda x, e=strain: e * x)
         # Newton stops at 1e-11 of the first residual
         assert side_force(bodies, where, axis) == pytest.approx(area * stress, rel=1e-8), strain
+        values = bodies.stress().x.array.reshape(-1, len(bodies.continuum.model.stress_labels))
+        assert values[:, axis] == pytest.approx(np.full(len(values), stress), rel=1e-8)
         bodies.commit()
     p = bodies.terms[0].equivalent_strain().x.array
     assert p == pytest.approx(np.full(len(p), 0.05 - peak / E), rel=1e-8)

@@ -24,7 +24,7 @@ from matplotlib.figure import Figure
 from fxcrack.continuum import Continuum
 from fxcrack.errors import unknown_name
 from fxcrack.interface.surface import _closure_table
-from fxcrack.output.fields import displacement_function
+from fxcrack.output.fields import displacement_function, stress_function
 from fxcrack.output.figure import GREY, INK, colour_bar, dress, new_figure, save
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def shape(scene: Scene, component: str = "von_mises") -> Shape:
     if component != "von_mises" and component not in labels:
         unknown_name("stress component", component, ["von_mises", *labels])
     u = displacement_function(scene)
-    stress = continuum.stress(u)
+    stress = stress_function(scene, u, scene.time)
     if component == "von_mises":
         values = _per_cell(continuum.von_mises(stress), 1)[:, 0]
     else:

@@ -42,13 +42,31 @@ def displacement_function(scene: Scene) -> fem.Function:
     return u
 
 
+def stress_function(scene: Scene, u: fem.Function, time: float) -> fem.Function:
+    """Cauchy stress of the present state, means over the undeformed cells; collective.
+
+    Components in the order of ``model.stress_labels``.
+
+    Args:
+        scene: The scene, after a step.
+        u: Its displacement.
+        time: Its time, which tells the temperature.
+    """
+    bodies = getattr(scene.model, "bodies", None)
+    if bodies is not None:
+        return bodies.stress()
+    if scene.continuum.temperature is not None:
+        scene.continuum.temperature.set(time)
+    return scene.continuum.stress(u)
+
+
 # -- grids -----------------------------------------------------------------------------------------
 
 
-def body_grid(scene: Scene, u: fem.Function) -> Grid:
+def body_grid(scene: Scene, u: fem.Function, time: float) -> Grid:
     """This rank's cells with displacement, stress and von Mises stress; collective."""
     continuum = scene.continuum
-    stress = continuum.stress(u)
+    stress = stress_function(scene, u, time)
     equivalent = continuum.von_mises(stress)
     topology, kinds, x = dolfinx.plot.vtk_mesh(continuum.space)
     width = continuum.space.dofmap.dof_layout.num_dofs
@@ -178,7 +196,7 @@ class FieldSeries:
         scene, comm = self._scene, self._scene.mesh.comm
         time = scene.time if time is None else time
         u = displacement_function(scene)
-        bodies = body_grid(scene, u)
+        bodies = body_grid(scene, u, time)
         surfaces = [
             interface_grid(pair, fields)
             for pair, fields in zip(scene.pairs, interface_fields(scene, u, time), strict=True)

@@ -55,6 +55,10 @@ class Term:
         """Change of the residual with u in the direction du; a UFL form."""
         return ufl.derivative(self.residual(u, v), u, du)
 
+    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
+        """Cauchy stress, components of ``model.stress_labels``, and measure of each part; UFL."""
+        return []
+
     def begin(self, time: float, dt: float) -> None:
         """An increment of dt ends at a time: set what depends on them; collective."""
 

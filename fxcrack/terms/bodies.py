@@ -156,6 +156,15 @@ class Bodies:
             for name, form in self._energies.items()
         }
 
+    def stress(self) -> fem.Function:
+        """Cauchy stress at the present displacement, means over the undeformed cells; collective.
+
+        Components in the order of ``model.stress_labels``.
+        """
+        return self.continuum.cell_means(
+            [part for term in self.terms for part in term.stresses(self.u)]
+        )
+
     def spent(self) -> dict[str, float]:
         """Energies turned into something else so far, by name; collective."""
         out: dict[str, float] = {}

@@ -14,7 +14,7 @@ from dolfinx import fem
 
 from fxcrack.continuum import Continuum
 from fxcrack.terms.base import StoringTerm
-from fxcrack.terms.kinematics import green_lagrange
+from fxcrack.terms.kinematics import deformation_gradient, green_lagrange, labelled, tensor
 
 
 class Elastic(StoringTerm):
@@ -49,3 +49,21 @@ class Elastic(StoringTerm):
                     e -= rise**2 / 2 * thermal.square_expansion(c, i)
             total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
         return total
+
+    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
+        """Cauchy stress; of a finite strain F S F^t/J.
+
+        The sheet of plane stress is taken as thick as it was, which is right to the order of the
+        strain.
+        """
+        c = self._continuum
+        small = c.model.strain(u, c.x)
+        if not self.finite:
+            return [(c.small_stress(i, small), c.parts[i][2]) for i in self._parts]
+        f = deformation_gradient(c.model, u, c.x)
+        out = []
+        for i in self._parts:
+            strain = green_lagrange(c.model, u, c.x)
+            second = tensor(c.model, c.small_stress(i, strain))
+            out.append((labelled(c.model, f * second * f.T / ufl.det(f)), c.parts[i][2]))
+        return out

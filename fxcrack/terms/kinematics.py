@@ -41,3 +41,20 @@ def cofactor(f: Any) -> Any:
     a, b, c = (ufl.as_vector([f[i, j] for i in range(3)]) for j in range(3))
     columns = ufl.cross(b, c), ufl.cross(c, a), ufl.cross(a, b)
     return ufl.as_matrix([[columns[j][i] for j in range(3)] for i in range(3)])
+
+
+def labelled(model: Model, tensor: Any) -> Any:
+    """Components of a stress of shape (3, 3) in the order of ``model.stress_labels``.
+
+    The third axis of a plane or a ring is the one out of it.
+    """
+    shears = [(1, 2), (0, 2), (0, 1)] if model.gdim == 3 else [(0, 1)]
+    return ufl.as_vector([tensor[i, j] for i, j in [(0, 0), (1, 1), (2, 2), *shears]])
+
+
+def tensor(model: Model, stress: Any) -> Any:
+    """The stress of shape (3, 3) with given ``model.stress_labels``."""
+    s = stress
+    if model.gdim == 3:
+        return ufl.as_matrix([[s[0], s[5], s[4]], [s[5], s[1], s[3]], [s[4], s[3], s[2]]])
+    return ufl.as_matrix([[s[0], s[3], 0], [s[3], s[1], 0], [0, 0, s[2]]])

@@ -18,7 +18,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError
 from fxcrack.models import PlaneStress
 from fxcrack.terms.base import StoringTerm
-from fxcrack.terms.kinematics import deformation_gradient
+from fxcrack.terms.kinematics import deformation_gradient, labelled
 
 
 class NeoHookeanBodies(StoringTerm):
@@ -45,22 +45,38 @@ class NeoHookeanBodies(StoringTerm):
     def energy(self, u: fem.Function) -> Any:
         """Strain energy."""
         c = self._continuum
-        domain = c.mesh.domain
-        f = deformation_gradient(c.model, u, c.x)
         total = 0
         for i in self._parts:
-            stiffness = c.part_materials[i].stiffness()
-            mu = fem.Constant(domain, PETSc.ScalarType(stiffness[3, 3]))
-            lame = fem.Constant(domain, PETSc.ScalarType(stiffness[0, 1]))
-            if c.temperature is None:
-                energy = density(f, mu, lame)
-            else:
-                from fxcrack import thermal
-
-                stretch = 1 + c.temperature.rise * thermal.expansion(c, i)[0]
-                energy = stretch**3 * density(f / stretch, mu, lame)
-            total += energy * c.weight * c.parts[i][2]
+            f, stretch, mu, lame = self._elastic_part(u, i)
+            total += stretch**3 * density(f, mu, lame) * c.weight * c.parts[i][2]
         return total
+
+    def _elastic_part(self, u: fem.Function, i: int) -> tuple[Any, Any, Any, Any]:
+        """Elastic deformation gradient, thermal stretch and the two moduli of a part."""
+        c = self._continuum
+        f = deformation_gradient(c.model, u, c.x)
+        stiffness = c.part_materials[i].stiffness()
+        mu, lame = (
+            fem.Constant(c.mesh.domain, PETSc.ScalarType(v))
+            for v in (stiffness[3, 3], stiffness[0, 1])
+        )
+        if c.temperature is None:
+            return f, 1, mu, lame
+        from fxcrack import thermal
+
+        stretch = 1 + c.temperature.rise * thermal.expansion(c, i)[0]
+        return f / stretch, stretch, mu, lame
+
+    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
+        """Cauchy stress (mu (F_e F_e^t - 1) + lambda ln J_e)/J_e."""
+        c = self._continuum
+        out = []
+        for i in self._parts:
+            f, _, mu, lame = self._elastic_part(u, i)
+            one, j = ufl.Identity(3), ufl.det(f)
+            stress = (mu * (f * f.T - one) + lame * ufl.ln(j) * one) / j
+            out.append((labelled(c.model, stress), c.parts[i][2]))
+        return out
 
 
 def density(f: Any, mu: Any, lame: Any) -> Any:

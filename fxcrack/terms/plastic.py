@@ -123,6 +123,10 @@ class Plasticity(Term):
             total += self._inner(stress, ev) * self._continuum.weight * dx
         return total
 
+    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
+        """Stress of the last update."""
+        return [(self._stress, dx) for _, _, dx in self._parts()]
+
     def begin(self, time: float, dt: float) -> None:
         """Set the temperature at the end of the increment."""
         if self._continuum.temperature is not None:
