@@ -15,6 +15,7 @@ from fxcrack.demos import (
     center_crack,
     dcb,
     dcb3d,
+    effects_cost,
     enf,
     enhanced_dcb,
     friction_enf,
@@ -181,3 +182,13 @@ def test_a_bilayer_that_cools_releases_its_steady_rate(path: str | None) -> None
     assert len(steady) >= 3
     assert steady[:, 2] == pytest.approx(np.ones(len(steady)), rel=0.005)
     assert balanced(scene.history)
+
+
+def test_the_ladder_of_cost_counts_what_each_rung_adds() -> None:
+    ladder = {name: found for name, _, found in effects_cost.run(dx=2.0, ny=1, until=34.0)}
+    bare = ladder["bare"]
+    assert bare.counts["factorisations"] == 1 and not bare.effects
+    for name in ("contact", "friction", "temperature"):
+        assert ladder[name].path == "condensed" and ladder[name].counts["factorisations"] == 1
+    for name in ("finite strain", "plasticity"):
+        assert ladder[name].path == "newton" and ladder[name].counts["iterations"] > 0
