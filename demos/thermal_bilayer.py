@@ -16,8 +16,7 @@
 #
 # A temperature that scales a fixed field is one load pattern of a linear scene: it costs one column
 # of the condensed matrix, and no factorisation when it changes. The same scene through the
-# nonlinear
-# solver must give the same history.
+# nonlinear solver must give the same history.
 #
 # The toughness falls on cooling. The temperature at which the crack starts closes a small loop: it
 # is where G(T) meets Gc(T).
@@ -128,6 +127,7 @@ def main(out: Path, fine: bool = False) -> None:
         return figure
 
     save(scene.mesh.comm, out / "rate.png", draw)
+    fx.plots.deformed(scene, out / "deformed.png")
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 from specimens import largest_imbalance
 
-from fxcrack.demos import large_dcb
+from fxcrack.demos import large_dcb, thermal_bilayer
 
 pytestmark = pytest.mark.demos
 
@@ -39,3 +39,15 @@ def test_neo_hookean_large_dcb(comm: MPI.Intracomm):
         assert rate == pytest.approx(by_slope, rel=0.005)
     assert largest_imbalance(scene.history) < BALANCE
     scene.close()
+
+
+def test_bilayer_gives_the_same_history_on_both_paths():
+    # from the shortest crack on: its wake is the end of the layers
+    one, other = (thermal_bilayer.run(dx=0.5, until=2.0, path=path) for path in (None, "newton"))
+    assert len(one[1]) >= 3
+    # the required 1e-6; G meets the toughness to 1e-9
+    np.testing.assert_allclose(one[1], other[1], rtol=1e-6)
+    assert one[1][:, 2] == pytest.approx(np.ones(len(one[1])), rel=0.01)  # the required 1 %
+    for scene, _ in (one, other):
+        assert largest_imbalance(scene.history) < BALANCE
+        scene.close()

@@ -271,6 +271,8 @@ class CondensedModel:
             self._condensation.schur, coordinates.n_window, self.n_loads, len(self.loads)
         )
         self._face_loads = -self._condensation.borders_on_window[:, : len(self.loads)]
+        # a temperature acts on no face; its force on a node at an end does not follow the crack
+        self._face_loads[:, [not isinstance(x, Load) for x in self.loads]] = 0.0
 
     def _condense_by_columns(self, columns: ColumnStore, roles: Roles) -> JumpCoordinates:
         """Coordinates of the window with S on them, no factorisation; collective."""
