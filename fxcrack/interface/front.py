@@ -178,7 +178,14 @@ class Front:
 
     def release(self, nodes: Ints) -> None:
         """Open nodes and forget the geometry around them."""
-        self.bonded[nodes] = False
+        self._set(nodes, bonded=False)
+
+    def bond(self, nodes: Ints) -> None:
+        """Take back a release that led nowhere."""
+        self._set(nodes, bonded=True)
+
+    def _set(self, nodes: Ints, *, bonded: bool) -> None:
+        self.bonded[nodes] = bonded
         self.version += 1
         for node in nodes:
             for facet in self._facets_of[node]:

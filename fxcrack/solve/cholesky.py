@@ -39,11 +39,16 @@ class GrowingCholesky:
     Args:
         matrix: S, shape (n, n); only read.
         floor: A pivot below ``floor`` times the diagonal of S counts as zero.
+
+    Attributes:
+        round_off: Round-off of the entries of S; a pivot below it counts as zero as well. A number
+            or one per unknown, shape (n,).
     """
 
     def __init__(self, matrix: Array, *, floor: float = 1e-10) -> None:
         self._matrix = matrix
         self._floor = floor
+        self.round_off: float | Array = 0.0
         self._strips: list[Array] = []  # rows of L, 64 by 64, no wider than their last diagonal
         self._inverse: list[Array] = []
         self.free: Ints = np.zeros(0, dtype=np.int64)
@@ -174,7 +179,8 @@ class GrowingCholesky:
         """
         tile, info = lapack.dpotrf(star, lower=1, clean=1)
         scale = self._matrix[extra, extra]
-        bad = np.diagonal(tile) ** 2 <= self._floor * scale
+        least = np.broadcast_to(self.round_off, len(self._matrix))[extra]
+        bad = np.diagonal(tile) ** 2 <= np.maximum(self._floor * scale, least)
         if info > 0:
             raise NotPositiveDefinite(int(extra[info - 1]))
         if np.any(bad):

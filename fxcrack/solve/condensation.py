@@ -166,6 +166,7 @@ class Condensation:
         schur: S, shape (n_last, n_last), the same on every rank.
         n_negative: Negative pivots of the inner block, where it need not be definite.
         borders_on_window: See :func:`bordered_matrix`.
+        diagonal: That of A on the last coordinates, shape (n_last,): S is a difference from it.
     """
 
     def __init__(
@@ -190,6 +191,7 @@ class Condensation:
         self._inner_matrix: PETSc.Mat | None = None
         start = time.perf_counter()
         self.matrix, self.borders_on_window = bordered_matrix(stiffness, coordinates, borders)
+        self.diagonal = self._last_diagonal()
         timings.add("transform", start)
         start = time.perf_counter()
         if method == "schur" or (method == "auto" and library() is not None):
@@ -210,6 +212,16 @@ class Condensation:
         timings.add("factor_with_schur", start)
         if not np.all(np.isfinite(self.schur)):
             raise SolverError(mumps_message(-10, 0))
+
+    def _last_diagonal(self) -> Array:
+        """Diagonal of A on the last coordinates, the same on every rank; collective."""
+        diagonal = self.matrix.getDiagonal()
+        out = np.zeros(self.coordinates.n_last)
+        if self._comm.rank == 0:
+            out[:] = diagonal.array_r[self.coordinates.n_inner :]
+        diagonal.destroy()
+        self._comm.Bcast(out)
+        return out
 
     def _rows(self) -> tuple[PETSc.IS, PETSc.IS]:
         """Index sets of the inner and of the last rows of this rank."""

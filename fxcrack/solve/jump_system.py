@@ -262,20 +262,37 @@ class JumpSystem(LinearJumps):
                 yield at, point
             self.contact_steps += len(changing) > 0
             self._switch(changing)
+            here, last = at, point
             if at_soft <= step + 1e-12:
                 self.finish([b for b in leaving if self.soft.switch(b, point.jump)])
-            here, last = at, point
+                if self._penetrates(point):
+                    last = self._put_right(point, point)
+                    yield here, last
 
     def _run_through(self, state: Equilibrium) -> Equilibrium:
         """The next stable equilibrium at constant load after an unstable one, contact included.
 
-        Contact stays as it is while bonds run open, and is put right afterwards. What changes then
-        does so away from zero gap and pressure, and the work of its pressures is lost energy.
+        Contact stays as it is while bonds run open, and is put right afterwards.
         """
-        given = state.force.copy()
+        return self._put_right(state, self.pass_unstable(state))
+
+    def _penetrates(self, state: Equilibrium) -> bool:
+        """Whether faces overlap where a bond is gone that let them.
+
+        While a bond softens its faces are not in contact, unless they were pressed from the start.
+        """
+        gap = np.where(self.contact & ~self.closed, state.jump + self.gap, 0.0)
+        return bool(gap.min(initial=0.0) < -_ROUND_OFF * np.abs(state.jump).max(initial=0.0))
+
+    def _put_right(self, state: Equilibrium, last: Equilibrium) -> Equilibrium:
+        """The equilibrium with contact at the loads of ``last``, which does not meet it.
+
+        What changes does so away from zero gap and pressure: the work of the pressures since
+        ``state``, the last equilibrium that met contact, is lost energy.
+        """
+        given = last.force.copy()
         given[self.soft.components] = 0.0
-        last = self.pass_unstable(state)
-        for _, point in self.pieces(last, state.loads, given):
+        for _, point in self._pieces(last, last.loads, given):
             last = point
         touching = np.flatnonzero(self.contact)
         pressures = [self.forces(s, touching) - s.force[touching] for s in (state, last)]

@@ -338,13 +338,14 @@ class LinearJumps:
         jump[self.cholesky.free] -= self.cholesky.backward(self.soft.coupling @ soft)
         jump[mine] = soft
         force = force.copy()
-        force[mine] = self.soft.forces(soft)
+        # as the bodies feel them: a stiff branch times the round-off of an opening is much more
+        force[mine] = self._product(mine, np.concatenate([jump, loads]))
         return force
 
     def pass_unstable(self, state: Equilibrium) -> Equilibrium:
         """Run downhill from an unstable state to the next stable one, at constant load."""
         mine = self.soft.components
-        self.finish(self.soft.snap(state.jump[mine]))
+        self.finish(self.soft.snap(state.jump[mine], self.cholesky.round_off))
         given = state.force.copy()
         given[mine] = 0.0
         return self.linear(state.loads, given)

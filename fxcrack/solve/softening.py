@@ -244,11 +244,12 @@ class SoftSet:
 
     # -- passing an unstable state -------------------------------------------------------------
 
-    def snap(self, jump: Array) -> list[SoftBond]:
+    def snap(self, jump: Array, round_off: float | Array = 0.0) -> list[SoftBond]:
         """Run downhill from an unstable equilibrium at constant load.
 
         Args:
             jump: Soft jumps of the equilibrium, shape (r,).
+            round_off: That of the entries of S, a number or one per unknown.
 
         Returns:
             Bonds that opened all the way; the branches of the others are set for the new state.
@@ -265,7 +266,8 @@ class SoftSet:
             inner = np.linalg.pinv(across @ self.star @ across.T, rcond=_LOOSE, hermitian=True)
             stiffness -= coupling.T @ inner @ coupling
         mine = self.components
-        least = _LOOSE * float(self._schur[mine, mine].max())
+        noise = np.broadcast_to(round_off, len(self._schur))[mine]
+        least = float(np.maximum(_LOOSE * self._schur[mine, mine], noise).max())
         strength = np.array([b.strength for b in self.bonds])
         final = np.array([b.final for b in self.bonds])
         w = directions @ jump

@@ -209,7 +209,8 @@ class RateEvaluator:
         """Part of a unit's energy that each of its nodes spends, shape (n, k).
 
         That of its product F w in crack closure. On second-order faces the bond at the midside node
-        is often pressed while that of the corner pulls: all is the corner's then.
+        is often pressed while that of the corner pulls: all is the corner's then. Less than a
+        millionth counts as none: such a bond would be too brittle to follow.
         """
         tips, measured = values.tips, values.measured
         assert measured is not None
@@ -220,8 +221,9 @@ class RateEvaluator:
         products = force * opening
         products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)
         spent = np.maximum(products.sum(axis=2), 0.0)
-        total = spent.sum(axis=1, keepdims=True)
-        shares = np.divide(spent, total, out=np.full((n, k), 1.0 / k), where=total > 0.0)
+        spent[spent < 1e-6 * spent.max(axis=1, keepdims=True)] = 0.0
+        whole = spent.sum(axis=1, keepdims=True)
+        shares = np.divide(spent, whole, out=np.full((n, k), 1.0 / k), where=whole > 0.0)
         # at the end of a surface the corner stands for both
         shares[tips.force_nodes[:, 0] == tips.force_nodes[:, -1]] = 1.0
         return np.asarray(shares)

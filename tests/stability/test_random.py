@@ -20,20 +20,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import hypothesis
 import numpy as np
 import numpy.typing as npt
 import pytest
 from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 from mpi4py import MPI
-from specimens import gathered, gathered_vector
 
 import fxcrack as fx
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
-from fxcrack.output.history import Row
-from fxcrack.solve.softening import SoftBond
+from stability.watch import Watch, assert_in_balance
 
 Array = npt.NDArray[np.float64]
 
@@ -42,9 +39,6 @@ pytestmark = pytest.mark.stability
 LENGTH = 10.0
 TOUGHNESS = 1e-4
 PHASES = (Phase.explicit, Phase.generate)  # shrinking takes minutes, and may part the ranks
-PENETRATION = 1e-10  # of the largest jump: asked for
-FORCE = 1e-11  # of the sum of |stiffness| |displacement| a force is the difference of: round-off
-BALANCE = 1e-8  # of the work: where bonds change branch is found to 1e-6 of their force
 
 
 @dataclass(frozen=True)
@@ -191,98 +185,10 @@ def scene_of(case: Case, comm: MPI.Intracomm, amplitude: Any) -> fx.Scene:
     )
 
 
-def stored_in(bond: SoftBond, opening: float) -> float:
-    """What a softening bond would give back on its way to zero force."""
-    most = opening if bond.largest is None else bond.largest
-    return 0.5 * bond.force(opening) ** 2 / replace(bond, largest=most).secant
-
-
-class Watch:
-    """Checks the state after every event; an observer."""
-
-    def __init__(self, scene: fx.Scene) -> None:
-        self.scene = scene
-        self.bonded = scene.model.fronts[0].bonded.copy()
-        self.dissipated = self.work = self.terms = self.jump = 0.0
-        self.count = 0
-
-    def __call__(self, event: str, row: Row) -> None:
-        model = self.scene.model
-        system, state = model.system, model.state
-        front, index = model.fronts[0], model.index[0]
-        assert all(np.isfinite(v) for k, v in row.items() if k != "event"), row
-        force = system.forces(state, np.arange(system.n_window))
-        last = np.abs(np.concatenate([state.jump, state.loads]))
-        terms = np.abs(system.schur[: system.n_window, : len(last)]) @ last
-        # where the load passes zero, what is left is round-off of the largest load so far
-        self.terms = max(self.terms, float(terms.max(initial=0.0)))
-        self.jump = max(self.jump, float(np.abs(state.jump).max(initial=0.0)))
-        slack = FORCE * self.terms
-        # irreversibility
-        assert not np.any(front.bonded & ~self.bonded)
-        self.bonded = front.bonded.copy()
-        # bonds are shut; what is released carries what its law says and no more
-        held = index[front.bonded]
-        assert np.all(state.jump[held[held >= 0]] == 0.0)
-        soft = np.zeros(system.n_window, dtype=bool)
-        soft[system.soft.components] = True
-        free = system.free & ~soft
-        assert np.abs(force - state.force)[free].max(initial=0.0) <= slack
-        bonds = system.soft.bonds
-        for bond in bonds:
-            carried = -force[bond.components] @ bond.direction
-            assert carried <= bond.strength * (1.0 + 1e-6) + slack  # as the events are found
-        # contact
-        if system.contact.any():
-            gap = (state.jump + system.gap)[system.contact]
-            push = (force - state.force)[system.contact]
-            assert gap.min() >= -PENETRATION * self.jump
-            assert push.min() >= -slack
-            assert np.abs(gap * push).max() <= self.jump * slack
-        # energies
-        self.work = max(self.work, abs(float(row["external_work"])))
-        none = BALANCE * self.work + 0.01 * slack * float(last.max())
-        assert row["strain_energy"] >= -none
-        stored = sum(stored_in(b, b.opening(state.jump)) for b in bonds)
-        dissipated = float(row["released_energy"]) - stored  # bonds give the rest back
-        # the first part of a bond's path, 1e-7 of it, is its unloading path too
-        elastic = 1e-7 * sum(0.5 * b.strength * b.final for b in bonds)
-        assert dissipated >= self.dissipated - none - elastic
-        assert abs(row["balance"]) <= none
-        self.dissipated = dissipated
-        self.count += 1
-
-
-def assert_in_balance(scene: fx.Scene) -> None:
-    """K u - f on the mesh: zero at free nodes, opposite at the two sides of the interface."""
-    model = scene.model
-    u = model.displacement()
-    vector = model.nodal_forces(u)
-    gdim = scene.mesh.gdim
-    residual = gathered_vector(vector).reshape(-1, gdim)
-    which = np.concatenate(scene.mesh.comm.allgather(scene.supports.which)).reshape(-1, gdim)
-    stiffness = abs(gathered(model._stiffness))
-    slack = FORCE * float((stiffness @ np.abs(gathered_vector(u))).max())
-    u.destroy()
-    vector.destroy()
-    pair = scene.pairs[0]
-    at_interface = np.zeros(len(residual), dtype=bool)
-    at_interface[pair.surface.dofs] = True
-    at_interface[pair.masters.ravel()] = True
-    free = (which < 0) & ~at_interface[:, None]
-    assert np.abs(residual[free]).max(initial=0.0) <= slack
-    # the interface forces on slaves come back on masters: only supports are left in the sum
-    slaves = residual[pair.surface.dofs]
-    spread = np.zeros_like(residual)
-    np.add.at(spread, pair.masters, -pair.weights[..., None] * slaves[:, None])
-    rest = np.where(which < 0, residual - spread, 0.0)
-    rest[pair.surface.dofs] = 0.0
-    assert np.abs(rest).max() <= slack
-
-
 def step_of(case: Case, scale: float) -> tuple[fx.Amplitude, fx.Static]:
     times = tuple(float(t) for t in range(len(case.turns) + 1))
-    amplitude = fx.Amplitude(times, (0.0, *(scale * t for t in case.turns)))
+    # not at f = 1 itself, where round-off decides
+    amplitude = fx.Amplitude(times, (0.0, *(1.03 * scale * t for t in case.turns)))
     return amplitude, fx.Static(
         until=fx.Time(times[-1]), stepping=case.stepping, initial=0.05, max_cutbacks=40
     )
@@ -307,7 +213,7 @@ def _first_values(scene: fx.Scene) -> Any:
 def check(case: Case) -> fx.History:
     amplitude, step = step_of(case, onset_of(case))
     scene = scene_of(case, MPI.COMM_SELF, amplitude)
-    watch = Watch(scene)
+    watch = Watch(scene, TOUGHNESS)  # of a unit of area
     history = scene.run(step, observers=[watch], progress=False)
     assert watch.count == len(history)
     assert_in_balance(scene)
@@ -362,13 +268,33 @@ FOUND = {
         nu=(0.0, 0.0), bonded=(False, True, False), release=2, load=1, turns=(-1.5, 2.25),
         force=True,
     ),
+    # pivots of a free body are round-off of a stiffness that nu = 0.4999 makes 1e4 times larger
+    "free but nearly incompressible": case(
+        upper=(3.0, 9.0, 10.0), lower=(7.0, 8.0, 6.0, 2.0, 6.0, 3.0, 6.0, 7.0),
+        heights=(2.75, 2.5), ny=1, order=2, stiffness=0.01, nu=(0.4999, 0.4999), release=0,
+        turns=(1.5, 1.25), stepping="event", force=True,
+    ),
+    # the last nodes go, contact opens, and only then nothing holds the body: taken back as a whole
+    "free after its contact opens": case(
+        upper=(3.0, 10.0, 8.0), heights=(3.0, 1.75), ny=1, width=(2.0, 7.0), stiffness=1e4,
+        bonded=(False, True, False), contact=True, method="vcct", mix=3, release=0,
+        turns=(2.0,), force=True,
+    ),
+    # faces overlapped while their bond softened, and lost energy when it was gone
+    "overlap behind a softening bond": case(
+        upper=(4.0, 6.0, 8.0, 5.0, 2.0, 2.0, 3.0, 9.0), heights=(0.5, 1.5), ny=1, order=2,
+        stiffness=1e-4, nu=(0.0, 0.4999), bonded=(True, False, False, False, True, False, False),
+        contact=True, method="vcct", load=1, turns=(-2.0,), stepping="event",
+    ),
 }  # fmt: skip
+APART = ("comes apart", "comes free on the way", "free but nearly incompressible",
+         "free after its contact opens")  # fmt: skip
 
 
 @pytest.mark.parametrize("name", FOUND)
 def test_found(name: str) -> None:
     history = check(FOUND[name])
-    if name in ("comes apart", "comes free on the way"):
+    if name in APART:
         assert history.reason.startswith("total separation: ")
         assert history.reason.endswith("the step ends in the last equilibrium before it")
 
@@ -376,17 +302,10 @@ def test_found(name: str) -> None:
 @settings(max_examples=25, phases=PHASES)
 @given(cases())
 def test_invariants(case: Case) -> None:
-    # known open: second-order units that soften beside contact lose 1e-6 of the energy
-    hypothesis.assume(case.order == 1 or case.release == 0)
     check(case)
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=False,
-    reason="known open: after a total separation under forces the fields of the last equilibrium "
-    "are not in balance (found by this search), and second-order units that soften beside contact",
-)
 @settings(max_examples=150, phases=PHASES)
 @given(cases())
 def test_invariants_of_more(case: Case) -> None:
@@ -397,7 +316,12 @@ def test_invariants_of_more(case: Case) -> None:
 @settings(max_examples=8, phases=PHASES)
 @given(cases())
 def test_any_number_of_ranks(case: Case) -> None:
-    """The same events at the same nodes; a stiffness ratio of 1e4 leaves 1e-7 of the values."""
+    """The same events at the same nodes, each value within 1e-7 of the largest of its kind.
+
+    Bonds let go at once here: where softening ones are unstable in two ways, round-off picks one.
+    Poisson's ratio is 0.3: at 0.4999 a body on its last bond is next to free.
+    """
+    case = replace(case, release=0, nu=(0.3, 0.3))
     amplitude, step = step_of(case, onset_of(case))
     histories = []
     for comm in (MPI.COMM_SELF, MPI.COMM_WORLD):
