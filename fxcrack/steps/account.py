@@ -230,6 +230,8 @@ class Account:
         if not all(g.held(t) for g, t in zip(self.growths, tips, strict=True)):
             self.model.rebase()
             self.model.solve(self._force_at(self.time))
+            for g, t in zip(self.growths, tips, strict=True):
+                g.check_wake(t)
         self._values = [
             g.evaluate(t, self.model.state, self.time)
             for g, t in zip(self.growths, tips, strict=True)

@@ -24,6 +24,7 @@ from fxcrack.interface.extent import CrackExtent
 from fxcrack.interface.front import Tips
 from fxcrack.interface.pairing import Interface, Pair
 from fxcrack.interface.path import SurfacePaths
+from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
@@ -157,6 +158,23 @@ class Growth:
         needed = [tips.force_nodes.ravel(), tips.wake_nodes.ravel()]
         needed += [e.needs(tips) for e in (self.evaluator, *self.watched)]
         return self.model.holds(self.p, np.concatenate(needed))
+
+    def check_wake(self, tips: Tips) -> None:
+        """Refuse tips whose opening behind cannot be known even in a window made for them.
+
+        Raises:
+            InputError: A support holds the node behind a tip but not its master in the same way.
+        """
+        if getattr(self.criterion, "method", "") != "vcct":
+            return
+        for node, wake in zip(tips.node, tips.wake_nodes, strict=True):
+            if not self.model.holds(self.p, wake.ravel()):
+                raise InputError(
+                    f"interface '{self.title}': a support holds a node behind the tip at "
+                    f"{place(self.front.surface.x[node])} but not its master in the same way, so "
+                    "the opening there cannot be measured; open one more element, take "
+                    "method='closure', or end the support before the crack faces"
+                )
 
     def evaluate(self, tips: Tips, state: Equilibrium, time: float) -> TipValues:
         """F at the tips and what is behind it."""

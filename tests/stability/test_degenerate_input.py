@@ -246,3 +246,25 @@ def test_bonded_nodes_at_one_place() -> None:
     )
     assert history.rows[-1]["released[bond]"] >= 4
     assert largest_imbalance(history) < 1e-9
+
+
+def test_opening_that_a_support_hides() -> None:
+    """One open element, whose end face is moved: the node behind the tip has no jump of its own.
+
+    Its opening would count as zero, and the crack would never grow without a word; exact closure
+    needs no opening and goes on.
+    """
+    supports = [
+        fx.Displacement("end_upper", x=0.0, y=1.0),
+        fx.Displacement("end_lower", x=0.0, y=-1.0),
+    ]
+
+    def grow(method: str) -> fx.History:
+        mesh = dcb_2d(MPI.COMM_SELF, length=20.0, dx=1.0, ny=2)
+        criterion = fx.VCCT(GIc=0.2, method=method)  # type: ignore[arg-type]
+        built = specimen(mesh, a0=1.0, supports=supports, criterion=criterion)
+        return built.run(fx.Static(until=fx.Releases(3)), progress=False)
+
+    with pytest.raises(fx.InputError, match=r"behind the tip at \(1, 0, 0\) but not"):
+        grow("vcct")
+    assert grow("closure").reason == "3 nodes released"
