@@ -315,7 +315,11 @@ class Scene:
         return found
 
     def close(self) -> None:
-        """Free all PETSc objects; collective. The history stays."""
+        """Free all PETSc objects; collective. The history stays.
+
+        On one rank this happens by itself when the scene is no longer used. On several it does not:
+        close scenes made in a loop, for MPI has a limited number of communicators.
+        """
         self.model.destroy()
 
 

@@ -73,16 +73,24 @@ def test_releases_and_new_windows_leave_nothing_behind(
     assert {k: n for k, n in alive(comm, shared_path).items() if n != before.get(k, 0)} == {}
 
 
-@pytest.mark.mpi
-def test_scenes_leave_nothing_behind(comm: MPI.Intracomm, shared_path: Path) -> None:
-    """Twenty scenes made, run, asked for fields and closed."""
+@pytest.mark.parametrize(
+    "closed",
+    [pytest.param(True, marks=pytest.mark.mpi, id="closed"), pytest.param(False, id="dropped")],
+)
+def test_scenes_leave_nothing_behind(comm: MPI.Intracomm, shared_path: Path, closed: bool) -> None:
+    """Ten scenes made, run, asked for fields, and closed or only no longer used.
+
+    One that stays alive keeps its mesh and six communicators, of which MPICH has 2048. On several
+    ranks freeing is collective, which garbage collection is not: scenes must be closed there.
+    """
     PETSc.Log.begin()
     objects = []
     for method in ("schur", "columns") * 5:
         scene = dcb(comm, dx=2.0, ny=1, options=fx.CondensedOptions(method=method))
         scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 34.0)))
         scene.model.displacement().destroy()
-        scene.close()
+        if closed:
+            scene.close()
         del scene
         objects.append(alive(comm, shared_path))
     # the first pair fills caches of DOLFINx

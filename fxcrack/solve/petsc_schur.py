@@ -10,6 +10,7 @@ several; the other is mirrored here. PETSc wants all Schur rows on rank 0.
 from __future__ import annotations
 
 import ctypes
+import weakref
 from collections.abc import Callable
 from typing import Any
 
@@ -48,6 +49,16 @@ def _handle(thing: Any) -> ctypes.c_void_p:
     return ctypes.c_void_p(thing.handle)
 
 
+def _let_go(lib: ctypes.CDLL, factor: ctypes.c_void_p) -> None:
+    """Free a factor whose Python object is gone, as petsc4py does with its own objects.
+
+    Ranks collect garbage at different times, and freeing is collective: PETSc keeps what belongs to
+    several ranks until :func:`petsc4py.PETSc.garbage_cleanup`.
+    """
+    if factor and PETSc.Sys.isInitialized() and not PETSc.Sys.isFinalized():
+        lib.PetscObjectDelayedDestroy(ctypes.byref(factor))
+
+
 class SchurFactor:
     """Cholesky factor of A_11 together with the dense S; collective.
 
@@ -79,6 +90,7 @@ class SchurFactor:
         self._lib = lib
         self._ordering = ordering(gdim)
         self._factor = ctypes.c_void_p()
+        weakref.finalize(self, _let_go, lib, self._factor).atexit = False
         self._comm = compat.plain_comm(matrix.getComm().tompi4py())
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, definite)
@@ -158,8 +170,7 @@ class SchurFactor:
     def destroy(self) -> None:
         """Free the factor; collective."""
         if self._factor:
-            self._call("MatDestroy", ctypes.byref(self._factor))
-            self._factor = ctypes.c_void_p()
+            self._call("MatDestroy", ctypes.byref(self._factor))  # and sets the handle to NULL
 
 
 def ordering(gdim: int) -> int:
