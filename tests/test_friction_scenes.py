@@ -236,7 +236,7 @@ def cylinder(n: int = 120, ny: int = 24, *, smallest: float = 0.05, shift: float
     round face, and the gaps are kept.
     """
     mesh = dcb_2d(MPI.COMM_SELF, length=2.0, height=1.0, dx=2.0 / n, ny=ny)
-    x, cells = mesh.domain.geometry.x, mesh.domain.geometry.dofmaps[0]
+    x, cells = mesh.domain.geometry.x, fx.compat.geometry_dofmap(mesh.domain)
     upper = np.zeros(len(x), dtype=bool)
     upper[cells[x[cells, 1].mean(axis=1) > 0.0].ravel()] = True
 

@@ -36,6 +36,8 @@ def owners(scene: fx.Scene) -> npt.NDArray[np.int64]:
 @pytest.mark.parametrize("release", [fx.Step(), fx.Progressive()])
 def test_front_crosses_borders(comm: MPI.Intracomm, release: fx.Step | fx.Progressive) -> None:
     """A front across the width and the length of a beam that is spread over all ranks."""
+    # by exact closure a softening bond is neutral when it begins: round-off decides what it does
+    method = "closure" if isinstance(release, fx.Step) else "vcct"
     histories = []
     for where in (SELF, comm):
         scene = specimen(
@@ -43,7 +45,7 @@ def test_front_crosses_borders(comm: MPI.Intracomm, release: fx.Step | fx.Progre
             dcb_3d(where, length=12.0, width=8.0, dx=1.0, z_spacing=UNEVEN, ny=4, ny_lower=1),
             a0=2.0,
             supports=CLAMPED_3D,
-            criterion=fx.VCCT(GIc=0.2, method="closure"),
+            criterion=fx.VCCT(GIc=0.2, method=method),
         )
         scene.debonds[0] = fx.Debond(
             scene.debonds[0].interface, scene.debonds[0].criterion, release

@@ -78,8 +78,8 @@ def potentials(load: float) -> tuple[Array, Array]:
 
 
 def tougher_beyond(x: Array) -> Array:
-    """Toughness that triples, then grows tenfold, on the way."""
-    return np.where(x[:, 0] < 9.0, 0.2, np.where(x[:, 0] < 13.0, 0.6, 6.0))
+    """Toughness that triples, then grows tenfold, on the way; the steps lie between nodes."""
+    return np.where(x[:, 0] < 8.5, 0.2, np.where(x[:, 0] < 12.5, 0.6, 6.0))
 
 
 @pytest.mark.parametrize("toughness", [0.2, tougher_beyond])
