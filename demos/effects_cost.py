@@ -17,6 +17,7 @@ from mpi4py import MPI
 import fxcrack as fx
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_2d
+from fxcrack.output.explain import explain
 from fxcrack.output.figure import COLOURS, dress, new_figure, save
 
 ELASTIC = fx.Isotropic(70e3, 0.3, expansion=1e-5)
@@ -62,16 +63,9 @@ def run(dx: float = 0.5, ny: int = 4, until: float = 33.0) -> list[tuple[str, fl
             length = until if counted else 30.0 + 2.0 * dx
             scene.run(fx.Static(until=fx.CrackLength(bond, length)), progress=False)
             if counted:
-                out.append((name, time.perf_counter() - start, explained(scene)))
+                out.append((name, time.perf_counter() - start, explain(scene)))
             scene.close()
     return out
-
-
-def explained(scene: fx.Scene) -> Any:
-    """What :meth:`fxcrack.Scene.explain` prints, without printing it."""
-    from fxcrack.output.explain import explain
-
-    return explain(scene)
 
 
 def main(out: Path, fine: bool = False) -> None:

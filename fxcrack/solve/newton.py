@@ -201,7 +201,7 @@ class _StepSolver:
         assert self.iterate is not None
         try:
             self._problem.step(self.iterate, out)
-        except Exception as error:
+        except Exception as error:  # PETSc passes on a code only: kept for solve() to raise
             self._problem.error = error
             raise
 
