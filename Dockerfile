@@ -11,6 +11,7 @@ RUN apt-get update \
         python3-matplotlib \
         python3-pip \
         python3-pytest \
+        python3-pytest-xdist \
         python3-rich \
         python3-scipy \
         python3-setuptools \

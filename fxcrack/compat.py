@@ -21,9 +21,24 @@ import basix.ufl
 import dolfinx.cpp
 import dolfinx.graph
 import dolfinx.io.utils
+import dolfinx.jit
 import dolfinx.mesh
 from mpi4py import MPI
 from petsc4py import PETSc
+
+_COMPILING = 60
+"""Seconds one job waits for another that compiles the same form; DOLFINx' 10 are too few for a
+3-D form on a busy machine. A user's dolfinx_jit_options.json has precedence."""
+
+
+def _wait_for_other_jobs() -> None:
+    """Let jobs that start together share the cache of compiled forms."""
+    options = getattr(dolfinx.jit, "DOLFINX_DEFAULT_JIT_OPTIONS", {})
+    if "timeout" in options:
+        options["timeout"] = (max(options["timeout"][0], _COMPILING), options["timeout"][1])
+
+
+_wait_for_other_jobs()
 
 
 def plain_comm(comm: MPI.Intracomm) -> MPI.Intracomm:

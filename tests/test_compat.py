@@ -20,8 +20,6 @@ import fxcrack as fx
 from fxcrack import compat
 from fxcrack.meshes.dcb import dcb_2d
 
-pytestmark = pytest.mark.mpi
-
 CELLS = ["triangle", "quadrilateral", "tetrahedron", "hexahedron"]
 N = 3  # blocks per side
 
@@ -60,6 +58,7 @@ def build(comm: MPI.Comm, name: str, degree: int) -> tuple[dolfinx.mesh.Mesh, Ar
     return compat.create_mesh(comm, part, points, element), (cells, x)
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", CELLS)
 def test_cells_keep_their_nodes_and_their_place_in_the_input(
@@ -74,6 +73,7 @@ def test_cells_keep_their_nodes_and_their_place_in_the_input(
     np.testing.assert_array_equal(domain.geometry.x[dofs][..., : x.shape[1]], x[cells[mine]])
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("name", CELLS)
 def test_owned_facets_have_both_their_cells(comm: MPI.Comm, name: str) -> None:
     domain, (_, x) = build(comm, name, 1)
@@ -88,6 +88,7 @@ def test_owned_facets_have_both_their_cells(comm: MPI.Comm, name: str) -> None:
     assert comm.allreduce(outside) == 2 * dim * N ** (dim - 1) * per_square
 
 
+@pytest.mark.mpi
 def test_branching_facets_are_refused_where_unknown(comm: MPI.Comm) -> None:
     # Three triangles at the edge 0-1.
     cells = np.array([[0, 1, 2], [0, 1, 3], [0, 1, 4]])
@@ -103,6 +104,7 @@ def test_branching_facets_are_refused_where_unknown(comm: MPI.Comm) -> None:
             compat.create_mesh(comm, cells, x, element, max_facet_to_cell_links=3)
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", CELLS)
 def test_values_on_entities_reach_every_rank_that_has_them(
@@ -132,6 +134,7 @@ def test_values_on_entities_reach_every_rank_that_has_them(
         np.testing.assert_array_equal(found, place[entities])
 
 
+@pytest.mark.mpi
 def test_vertices_that_make_no_entity_are_not_found(comm: MPI.Comm) -> None:
     domain = dolfinx.mesh.create_unit_square(comm, 3, 3)
     domain.topology.create_connectivity(2, 0)
@@ -189,6 +192,7 @@ def test_vector_of_a_form_or_a_space(comm: MPI.Comm) -> None:
         b.destroy()
 
 
+@pytest.mark.mpi
 def test_an_error_while_a_mesh_dies_is_raised(comm: MPI.Intracomm) -> None:
     # the mesh is only an argument of the call that fails; its communicator goes with it
     with pytest.raises(fx.InputError, match="no mode-mix law"):
@@ -198,3 +202,8 @@ def test_an_error_while_a_mesh_dies_is_raised(comm: MPI.Intracomm) -> None:
             model=fx.PlaneStrain(),
             debonds=[fx.Debond(None, fx.VCCT(GIc=1.0, GIIc=2.0))],  # type: ignore[arg-type]
         )
+
+
+def test_jobs_that_start_together_wait_for_each_others_forms() -> None:
+    assert dolfinx.jit.get_options()["timeout"] >= 60
+    assert dolfinx.jit.get_options({"timeout": 5})["timeout"] == 5

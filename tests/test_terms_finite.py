@@ -29,8 +29,6 @@ from fxcrack.terms.bodies import Bodies
 from fxcrack.terms.elastic import Elastic
 from fxcrack.terms.neo_hookean import NeoHookeanBodies
 
-pytestmark = pytest.mark.mpi
-
 E, NU = 100.0, 0.3
 CARBON = fx.Orthotropic(
     E=(140.0, 10.0, 9.0), nu=(0.3, 0.25, 0.4), G=(5.0, 5.0, 3.5), frame=((1, 0.5, 0), (0, 1, 0))
@@ -151,6 +149,7 @@ def test_uniaxial_neo_hookean(comm: MPI.Intracomm, stretch: float) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_uniaxial_svk_in_plane_stress(comm: MPI.Intracomm) -> None:
     """S = E e along the bar: the nominal stress is l E (l^2 - 1)/2, the sides are free."""
     bodies = bodies_of(comm, "plane stress", fx.Isotropic(E, NU), 1)
@@ -161,6 +160,7 @@ def test_uniaxial_svk_in_plane_stress(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_materials_side_by_side(comm: MPI.Intracomm) -> None:
     """Each law in its own cells: the energies add up, the names too."""
     mesh = box(comm, "plane strain")
@@ -182,6 +182,7 @@ def test_materials_side_by_side(comm: MPI.Intracomm) -> None:
     both.destroy()
 
 
+@pytest.mark.mpi
 def test_inflated_ring(comm: MPI.Intracomm) -> None:
     """A ring that grows and lengthens uniformly: F = diag(b, l, b)."""
     bodies = bodies_of(comm, "ring", fx.NeoHookean(E, NU), 1)
@@ -200,6 +201,7 @@ def test_inflated_ring(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_plane_stress_is_refused(comm: MPI.Intracomm) -> None:
     with pytest.raises(InputError, match="thickness stretch"):
         bodies_of(comm, "plane stress", fx.NeoHookean(E, NU), 1)
@@ -207,6 +209,7 @@ def test_plane_stress_is_refused(comm: MPI.Intracomm) -> None:
         fx.NeoHookean(E, 0.5)
 
 
+@pytest.mark.mpi
 def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> None:
     """The bodies on all ranks and on this rank alone."""
     results = []

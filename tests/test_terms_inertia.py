@@ -33,8 +33,6 @@ from fxcrack.terms.bodies import Bodies
 from fxcrack.terms.elastic import Elastic
 from fxcrack.terms.inertia import REMEMBERED, InertiaForces
 
-pytestmark = pytest.mark.mpi
-
 Array = npt.NDArray[np.float64]
 
 E, RHO, L = 100.0, 4.0, 1.5
@@ -121,6 +119,7 @@ def exact_tip(bodies: Bodies, effect: fx.Inertia, time: float) -> float:
     return float(u[2 * tip])
 
 
+@pytest.mark.mpi
 @pytest.mark.verification
 def test_bar_vibrates_at_its_frequency(comm: MPI.Intracomm) -> None:
     """u = v0/w sin(w t) sin(pi x/2 L), w = pi/2 L sqrt(E/rho)."""
@@ -266,6 +265,7 @@ def test_tangent_is_assembled_once_per_length_of_the_increment(comm: MPI.Intraco
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     bodies = moving(comm, fx.Inertia(rayleigh=(0.1, 0.01)), nu=0.3, finite=True)
     bodies.begin(0.1, 0.1)
@@ -280,6 +280,7 @@ def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     effect = with_velocity(fx.Inertia(rayleigh=(0.1, 0.0)))
     first, second = moving(comm, effect), moving(comm, effect)
@@ -292,6 +293,7 @@ def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     second.destroy()
 
 
+@pytest.mark.mpi
 def test_ranks_agree(comm: MPI.Intracomm) -> None:
     tips = []
     for c in (comm, MPI.COMM_SELF):
@@ -301,6 +303,7 @@ def test_ranks_agree(comm: MPI.Intracomm) -> None:
     assert tips[0] == pytest.approx(tips[1], rel=1e-8)  # Newton stops at 1e-11
 
 
+@pytest.mark.mpi
 def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
     continuum = Continuum(box(comm, "solid"), fx.Isotropic(E, 0.3), fx.Solid(), order=2)
     for message, make in (

@@ -30,8 +30,6 @@ from fxcrack.terms.bodies import Bodies
 from fxcrack.terms.elastic import Elastic
 from fxcrack.terms.plastic import Plasticity
 
-pytestmark = pytest.mark.mpi
-
 Array = npt.NDArray[np.float64]
 
 E, NU, Y, H = 100.0, 0.3, 0.5, 10.0
@@ -162,6 +160,7 @@ def test_plane_strain_is_a_held_solid(comm: MPI.Intracomm) -> None:
     assert forces[0] == pytest.approx(forces[1], rel=1e-8)  # Newton stops at 1e-11
 
 
+@pytest.mark.mpi
 def test_energy_balance_is_exact(comm: MPI.Intracomm) -> None:
     """Work of the ends by the trapezoidal rule = elastic energy + plastic work, cycle included."""
     bodies = plastic(comm, "plane strain", fx.Plastic(E, NU, hardening=TABLE))
@@ -204,6 +203,7 @@ def test_clamped_bar_is_cooled_beyond_yield(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_beside_elastic_cells_and_restored(comm: MPI.Intracomm) -> None:
     mesh = box(comm, "plane strain")
     continuum = Continuum(
@@ -238,6 +238,7 @@ def test_beside_elastic_cells_and_restored(comm: MPI.Intracomm) -> None:
     second.destroy()
 
 
+@pytest.mark.mpi
 def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> None:
     results = []
     for c in (comm, MPI.COMM_SELF):
@@ -255,6 +256,7 @@ def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> Non
     assert results[0] == pytest.approx(results[1], rel=1e-11)  # sums in another order
 
 
+@pytest.mark.mpi
 def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
     with pytest.raises(InputError, match="thickness strain"):
         plastic(comm, "plane stress")

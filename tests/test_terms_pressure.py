@@ -28,8 +28,6 @@ from fxcrack.terms.elastic import Elastic
 from fxcrack.terms.neo_hookean import NeoHookeanBodies
 from fxcrack.terms.pressure import FollowerPressure
 
-pytestmark = pytest.mark.mpi
-
 
 def pressed(
     comm: MPI.Intracomm, model: str, order: int = 1, value: fx.loads.Field = 3.0, where: str = "x1"
@@ -79,6 +77,7 @@ def test_force_turns_with_the_body(comm: MPI.Intracomm, model: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 @pytest.mark.parametrize("model", ["plane strain", "ring", "solid"])
 def test_work_is_pressure_times_volume(comm: MPI.Intracomm, model: str) -> None:
     """All sides under constant pressure: work = -p times the change of volume, in any steps."""
@@ -101,6 +100,7 @@ def test_work_is_pressure_times_volume(comm: MPI.Intracomm, model: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_energy_balance_of_a_ramp(comm: MPI.Intracomm) -> None:
     """Work of a growing pressure against the energy stored; the error falls with the square."""
     errors = []
@@ -122,6 +122,7 @@ def test_energy_balance_of_a_ramp(comm: MPI.Intracomm) -> None:
     assert errors[1] < 2e-3 and np.log2(errors[0] / errors[1]) > 1.8, errors
 
 
+@pytest.mark.mpi
 def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     continuum = Continuum(
         box(comm, "plane strain"), fx.Isotropic(100.0, 0.3), MODELS["plane strain"]

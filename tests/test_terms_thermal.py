@@ -32,8 +32,6 @@ from fxcrack.terms.bodies import Bodies
 from fxcrack.terms.elastic import Elastic
 from fxcrack.terms.neo_hookean import NeoHookeanBodies
 
-pytestmark = pytest.mark.mpi
-
 Array = npt.NDArray[np.float64]
 
 E, NU, A = 100.0, 0.3, 1e-3
@@ -216,6 +214,7 @@ def test_taylor(comm: MPI.Intracomm, kind: str) -> None:
         bodies.destroy()
 
 
+@pytest.mark.mpi
 @pytest.mark.verification
 @pytest.mark.parametrize("path", ["linear", "finite"])
 def test_bilayer_curvature(comm: MPI.Intracomm, path: str) -> None:
@@ -285,6 +284,7 @@ def test_moduli_by_temperature(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.mpi
 def test_moduli_that_change_in_time(comm: MPI.Intracomm) -> None:
     """A clamped bar heated while it softens: stress E(T) A T, energies balance."""
     table = fx.ByTemperature(
@@ -333,6 +333,7 @@ def test_large_strain_heating_balances(comm: MPI.Intracomm) -> None:
     assert np.log2(errors[0] / errors[1]) > 1.8 and errors[1] < 1e-2, errors
 
 
+@pytest.mark.mpi
 def test_a_dolfinx_function_is_a_temperature(comm: MPI.Intracomm) -> None:
     mesh = box(comm, "plane strain")
     given = dolfinx.fem.Function(dolfinx.fem.functionspace(mesh.domain, ("Lagrange", 1)))
@@ -354,6 +355,7 @@ def test_a_dolfinx_function_is_a_temperature(comm: MPI.Intracomm) -> None:
         Continuum(other, STEEL, fx.PlaneStrain(), temperature=fx.Temperature(given))
 
 
+@pytest.mark.mpi
 def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> None:
     results = []
     for c in (comm, MPI.COMM_SELF):
@@ -366,6 +368,7 @@ def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> Non
     assert results[0] == pytest.approx(results[1], rel=1e-12)  # sums in another order
 
 
+@pytest.mark.mpi
 def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
     table = fx.ByTemperature({0.0: STEEL, 10.0: fx.Isotropic(E, 0.1)})
     assert table.temperatures == (0.0, 10.0)
