@@ -94,6 +94,7 @@ def test_onset_in_3d_is_that_of_other_programs() -> None:
     assert result["beam_theory"]["mean_load_ratio"] == pytest.approx(0.889, abs=0.005)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("problem", [COARSE, COARSE_3D], ids=lambda p: p.name)
 def test_baselines_follow_the_same_crack(problem: Problem) -> None:
@@ -158,6 +159,7 @@ def test_tables_show_what_the_file_holds(problem: Problem) -> None:
         assert number in shown
 
 
+@pytest.mark.slow
 def test_memory_of_the_solve_is_measured_apart() -> None:
     ballast = np.ones(40_000_000)  # 320 MB that the other process must not inherit
     memory = measure.memory_of_one_solve(COARSE, COMM)

@@ -143,12 +143,14 @@ def test_an_error_on_one_rank_ends_all_with_its_message() -> None:
     assert "ZeroDivisionError: on purpose" in done.stderr
 
 
+@pytest.mark.slow
 def test_an_error_of_fxcrack_on_one_rank_ends_all_with_its_message() -> None:
     done = run_on_two_ranks(_BROKEN.format(ranks="{1}", patience=0.5, error="errors.InputError"))
     assert done.returncode != 0
     assert "fxcrack: on purpose" in done.stderr
 
 
+@pytest.mark.slow
 def test_an_error_of_fxcrack_on_all_ranks_is_said_once() -> None:
     done = run_on_two_ranks(
         _BROKEN.format(ranks="{0, 1}", patience=30.0, error="errors.InputError")

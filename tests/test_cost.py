@@ -152,6 +152,7 @@ def test_machine() -> None:
     assert "cores" in machine_name()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_iteration_where_a_factorisation_would_not_fit(
     comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture

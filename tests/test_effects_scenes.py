@@ -30,6 +30,7 @@ def cracked(comm: MPI.Intracomm, material: Any, **more: Any) -> tuple[fx.Scene, 
     return scene, interface
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_plastic_arms_keep_their_books(comm: MPI.Intracomm) -> None:
     plastic = fx.Plastic(70e3, 0.3, yield_stress=40.0, hardening=1e3)

@@ -75,6 +75,7 @@ def slider() -> Blocks:
     return model
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_block_slides_over_many_facets(comm: MPI.Intracomm) -> None:
     # pressed down with a weight of 10 and moved by 4 of the beam's facets, without friction

@@ -42,6 +42,7 @@ def alive(comm: MPI.Intracomm, folder: Path) -> dict[str, int]:
     return {name: int(made) - int(gone) for name, made, gone in rows}
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_releases_and_new_windows_leave_nothing_behind(
     comm: MPI.Intracomm, shared_path: Path
@@ -73,6 +74,7 @@ def test_releases_and_new_windows_leave_nothing_behind(
     assert {k: n for k, n in alive(comm, shared_path).items() if n != before.get(k, 0)} == {}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "closed",
     [pytest.param(True, marks=pytest.mark.mpi, id="closed"), pytest.param(False, id="dropped")],

@@ -37,6 +37,7 @@ def short_dcb(comm: MPI.Intracomm, *, force: bool, effects: list[Any], GIc: floa
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "effects", [[], pytest.param([FiniteStrain()], marks=pytest.mark.mpi)], ids=["linear", "finite"]
 )

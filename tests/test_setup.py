@@ -46,6 +46,7 @@ def test_version_is_the_same_everywhere() -> None:
     assert installed == fxcrack.__version__ == PROJECT["project"]["version"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("after", "message"),
     [

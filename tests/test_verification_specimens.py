@@ -99,6 +99,7 @@ def test_double_cantilever_of_carbon_fibre_in_3d() -> None:
     assert largest_imbalance(history) < BALANCE
 
 
+@pytest.mark.slow
 def test_second_order_hexahedra() -> None:
     """One element over an arm, 2 long and 2.5 wide, against first-order meshes extrapolated to h=0.
 
