@@ -40,6 +40,7 @@ from fxcrack.output.atomic import replacing
 from fxcrack.output.checkpoint import checkpoints
 from fxcrack.solve.petsc_schur import library
 
+_FILE_WIDTH = 140  # characters of a table that goes into a file or a pipe
 _PATIENCE = 5.0  # seconds a rank that failed waits for the others to fail with it
 _PACKAGES = ("mumps", "superlu_dist", "superlu", "umfpack", "strumpack", "hypre", "ml", "ptscotch")
 
@@ -54,8 +55,11 @@ app = typer.Typer(
 
 
 def _console() -> Console:
-    """Where rank 0 prints tables; the other ranks print nowhere."""
-    return Console(quiet=MPI.COMM_WORLD.rank > 0, highlight=False)
+    """Where rank 0 prints tables, whole if into a file; the other ranks print nowhere."""
+    console = Console(quiet=MPI.COMM_WORLD.rank > 0, highlight=False)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = _FILE_WIDTH
+    return console
 
 
 # -- demos ---------------------------------------------------------------------------

@@ -19,7 +19,8 @@ from typer.testing import CliRunner
 
 import fxcrack as fx
 from fxcrack.bench import fit, scale_report
-from fxcrack.bench.scale import Case, dense_rate, measure, suite
+from fxcrack.bench.rates import dense_rate, unshared_rate
+from fxcrack.bench.scale import Case, measure, suite
 from fxcrack.cli import app
 from fxcrack.errors import InputError
 from fxcrack.solve.cost import Constants, Law, Task, advise, estimate, shipped
@@ -221,10 +222,20 @@ def test_tables() -> None:
     assert "time on 1 rank over that on P" in shown and "failed" not in shown
     # the seconds of `case` on 2 ranks are 0.6 of those on 1
     assert "1.67" in shown
+    assert "share nothing" not in shown
+    result["unshared"] = {"1": {"memory": 1.0, "caches": 1.0}, "2": {"memory": 1.6, "caches": 1.0}}
+    scale_report.show(result, Console(file=text, width=150))
+    assert "do 1.25 x the work of one if it comes from memory, 2.00 x" in text.getvalue()
 
 
 def test_dense_rates() -> None:
     assert all(v > 0.0 for v in dense_rate(200).values())
+
+
+def test_more_work_takes_longer() -> None:
+    few, many = (unshared_rate(MPI.COMM_SELF, n) for n in (100_000, 10_000_000))
+    assert many["memory"] > 5.0 * few["memory"] > 0.0
+    assert min(few["caches"], many["caches"]) > 0.0
 
 
 @pytest.mark.slow

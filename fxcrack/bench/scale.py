@@ -26,10 +26,10 @@ import fxcrack
 from fxcrack import processes
 from fxcrack.bench.measure import peak_memory, slowest
 from fxcrack.bench.problem import LENGTHS, Problem
+from fxcrack.bench.rates import dense_rate, message_rate, unshared_rate
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_3d
-from fxcrack.solve.cholesky import GrowingCholesky
 from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.solve.machine import machine_name
 from fxcrack.steps.static import Static
@@ -171,40 +171,6 @@ def measure(case: Case, comm: MPI.Intracomm) -> Result:
     return result
 
 
-def dense_rate(n: int = 1500) -> Result:
-    """Seconds of the dense algebra: a factor per n^3, a release with equilibrium per n^2."""
-    rng = np.random.default_rng(0)
-    base = rng.standard_normal((n, n))
-    matrix = base @ base.T + n * np.eye(n)
-    cholesky = GrowingCholesky(matrix)
-    start = time.perf_counter()
-    cholesky.append(np.arange(n - 60))
-    factor = time.perf_counter() - start
-    start = time.perf_counter()
-    for i in range(n - 60, n, 3):
-        cholesky.append(np.arange(i, i + 3))
-        cholesky.solve(matrix[cholesky.free, 0])
-    each = (time.perf_counter() - start) / 20
-    return {"factor_per_cube": factor / (n - 60) ** 3, "release_per_square": each / n**2}
-
-
-def message_rate(comm: MPI.Intracomm) -> Result:
-    """Latency and seconds per byte between ranks; collective; zeros on one rank."""
-    if comm.size == 1:
-        return {"latency": 0.0, "per_byte": 0.0}
-    seconds = []
-    for size in (8, 4_000_000):
-        block = np.zeros(size // 8)
-        comm.Allreduce(MPI.IN_PLACE, block)
-        comm.Barrier()
-        count = 200 if size < 100 else 10
-        start = time.perf_counter()
-        for _ in range(count):
-            comm.Allreduce(MPI.IN_PLACE, block)
-        seconds.append(slowest(comm, time.perf_counter() - start) / count)
-    return {"latency": seconds[0], "per_byte": max(seconds[1] - seconds[0], 0.0) / 4e6}
-
-
 def run(
     cases: list[Case],
     *,
@@ -221,15 +187,18 @@ def run(
         tell: Called with every result.
 
     Returns:
-        Date, machine, and the results; a case that failed has "failed" with the reason.
+        Date, machine, its rates, and the results; a case that failed has "failed" with the reason.
     """
     out: Result = {
         "date": date.today().isoformat(),
         "machine": machine_name(),
         "version": fxcrack.__version__,
         "dense": dense_rate(),
+        "unshared": {},
         "cases": [],
     }
+    for ranks in sorted({1} | {case.ranks for case in cases}):
+        out["unshared"][str(ranks)] = _start([], ranks, limit)
     for case in cases:
         words = [case.shape, f"{case.dofs:g}", case.method, str(int(case.ahead))]
         words.append(f"{memory_mb / case.ranks:.0f}")
@@ -262,9 +231,14 @@ def _start(words: list[str], ranks: int, limit: float) -> Result:
 
 
 def main() -> None:
-    """Measure one case in this process and its companions, and print the result."""
-    shape, dofs, method, ahead, memory_mb = sys.argv[1:]
+    """Measure one case, or the machine, in this process and its companions; print the result."""
     comm = MPI.COMM_WORLD
+    if len(sys.argv) == 1:
+        rates = unshared_rate(comm)
+        if comm.rank == 0:
+            print(json.dumps(rates), flush=True)
+        return
+    shape, dofs, method, ahead, memory_mb = sys.argv[1:]
     if float(memory_mb) > 0.0:
         most = int(float(memory_mb) * 1e6)
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))

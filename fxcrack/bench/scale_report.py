@@ -44,6 +44,16 @@ def show(result: Result, console: Console) -> None:
     strong = _strong(result["cases"])
     if strong.row_count:
         console.print(strong)
+    unshared = result.get("unshared", {})
+    for ranks, found in unshared.items():
+        if ranks == "1" or not {"memory", "caches"} <= found.keys() & unshared["1"].keys():
+            continue
+        gains = [int(ranks) * unshared["1"][k] / found[k] for k in ("memory", "caches")]
+        console.print(
+            f"{ranks} processes that share nothing but this machine do {gains[0]:.2f} x the work "
+            f"of one if it comes from memory, {gains[1]:.2f} x if it stays in the caches: no "
+            "program gains more from its ranks"
+        )
 
 
 def _strong(cases: list[Result]) -> Table:
