@@ -100,7 +100,7 @@ def run(
         for beam in (BEAM, STRAIN_BEAM)
     )
     area, spent = history["area[bond]"][inside], history["released_energy"][inside]
-    soft, onsets = scene.model.system.soft, int((history["event"] == "onset").sum())
+    soft, onsets = scene.model.soft_counts, int((history["event"] == "onset").sum())
     return scene, {
         "load / theory": stress,
         "load / plane strain": strain,

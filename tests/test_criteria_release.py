@@ -18,7 +18,7 @@ from fxcrack.criteria import (
     Step,
 )
 from fxcrack.errors import InputError
-from fxcrack.solve.softening import SoftBond
+from fxcrack.solve.soft_bond import SoftBond
 from fxcrack.steps.letting_go import ViscousRelease
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +28,9 @@ ROUND_OFF = 1e-12  # a few roundings of well-scaled numbers
 
 def bond(strength: float = 1.0, final: float = 1.0, largest: float | None = None) -> SoftBond:
     """A bond that softens along its only component."""
-    return SoftBond(np.array([0]), np.array([1.0]), strength, final, (0, 0, np.array([0])), largest)
+    return SoftBond(
+        np.array([0]), np.array([1.0]), strength, final, (0, np.array([0]), np.array([0])), largest
+    )
 
 
 def test_step_holds_in_its_increment_and_goes_in_the_next() -> None:

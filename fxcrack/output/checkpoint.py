@@ -27,7 +27,7 @@ from fxcrack.output.collective import together
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
-VERSION = 1
+VERSION = 2
 """Changes when a file of an earlier program can no longer be read."""
 
 

@@ -8,6 +8,7 @@ when the front leaves the window.
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,7 +34,8 @@ from fxcrack.solve.machine import machine_memory_mb
 from fxcrack.solve.petsc_schur import mumps_message
 from fxcrack.solve.rigid import check_held
 from fxcrack.solve.rubbing import FrictionMemory, let_go, meet, nodes_of, rubs
-from fxcrack.solve.softening import SoftBond
+from fxcrack.solve.soft_bond import SoftBond, SoftUnit
+from fxcrack.solve.softening import SoftCounts
 from fxcrack.solve.window import ColumnCost, CostModel, choose_roles
 
 Array = npt.NDArray[np.float64]
@@ -104,6 +106,7 @@ class CondensedModel:
         timings: Seconds per phase and number of factorisations.
         linear: Whether the bodies are, so that S outlives an increment.
         law_seconds: Seconds per law of the interface (contact, friction, softening).
+        soft_counts: Effort spent on softening bonds.
     """
 
     linear = True
@@ -125,6 +128,7 @@ class CondensedModel:
         self.options = options
         self.timings = Timings()
         self.law_seconds: dict[str, float] = {}
+        self.soft_counts = SoftCounts()
         self.fronts = [Front(p.surface, p.bonded, p.title) for p in pairs]
         self.n_loads = len(supports.columns) + len(loads)
         self.active = [False] * len(pairs)
@@ -204,7 +208,7 @@ class CondensedModel:
         for front, held in zip(self.fronts, coordinates.held, strict=True):
             front.tied = held.all(axis=1)
         self._condense(coordinates)
-        self.system.seconds = self.law_seconds
+        self.system.seconds, self.system.soft.counts = self.law_seconds, self.soft_counts
         start = time.perf_counter()
         self._restore_states()
         self.timings.add("march", start)
@@ -239,7 +243,7 @@ class CondensedModel:
             reach,
             self._cost if self.columns is None else self._column_cost,
             around=self.around,
-            keep=[*(b.where[:2] for b in self._soft), *self.keep],
+            keep=[*((b.where[0], k) for b in self._soft for k in b.where[1].tolist()), *self.keep],
             cap_mb=self.options.window_mb,
             gdim=self.continuum.gdim,
         )
@@ -303,8 +307,8 @@ class CondensedModel:
         """Free what is open in the new window, soften what softens, mark what may touch."""
         bonds = self._soft
         for bond in bonds:
-            p, node, local = bond.where
-            bond.components = self.index[p][node, local]
+            p, nodes, local = bond.where
+            bond.components = self.index[p][nodes, local]
         soft = np.concatenate([b.components for b in bonds]) if bonds else np.zeros(0, np.int64)
         for pair, front, index in zip(self.pairs, self.fronts, self.index, strict=True):
             is_open = ~front.bonded
@@ -481,28 +485,32 @@ class CondensedModel:
 
     # -- letting go ----------------------------------------------------------------------
 
-    def soften(self, p: int, nodes: Ints, energy: Array) -> None:
-        """Let the bond forces of nodes fall linearly with their opening.
+    def soften(self, p: int, units: Sequence[SoftUnit]) -> None:
+        """Let the bond forces of units fall linearly with their opening.
 
-        A normal force that presses stays: the node is in contact from then on.
+        The forces of all nodes of a unit fall in proportion. Where its faces are pressed together,
+        normal forces that press stay: these nodes are in contact from then on.
 
         Args:
             p: Number of the pair.
-            nodes: Slave nodes, bonded so far.
-            energy: Energy each of them is to dissipate, shape (n,).
+            units: What softens by one law each; bonded so far.
 
         Raises:
             NotPositiveDefinite: A body would come free; nothing is changed.
         """
         system, state = self.system, self.state
         bonds, force = [], state.force.copy()
-        for node, spend in zip(nodes, energy, strict=True):
-            local = np.flatnonzero(self.index[p][node] >= 0)
-            components = self.index[p][node, local]
+        for nodes, spend, pressed in units:
+            row, local = np.nonzero(self.index[p][nodes] >= 0)
+            components = self.index[p][nodes[row], local]
             traction = -system.forces(state, components)
-            if local[0] == 0 and traction[0] < 0.0:
-                system.contact[components[0]] = system.closed[components[0]] = True
-                local, components, traction = local[1:], components[1:], traction[1:]
+            if pressed:
+                stays = (local == 0) & (traction < 0.0)
+                closed = components[stays]
+                system.contact[closed] = system.closed[closed] = True
+                row, local, components, traction = (
+                    v[~stays] for v in (row, local, components, traction)
+                )
             strength = float(np.linalg.norm(traction))
             if not strength > 0.0:
                 system.release(components)
@@ -511,14 +519,15 @@ class CondensedModel:
             bonds.append(
                 SoftBond(
                     components, traction / strength, strength, 2.0 * spend / strength,
-                    (p, int(node), local),
+                    (p, nodes[row], local),
                 )
             )  # fmt: skip
-        self.fronts[p].release(nodes)
+        every = np.concatenate([unit.nodes for unit in units])
+        self.fronts[p].release(every)
         if bonds:
             system.soften(bonds)
             if self.pairs[p].interface.contact:
-                normals = self.index[p][nodes, 0]
+                normals = self.index[p][every, 0]
                 system.touches[normals[normals >= 0]] = True
         self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 

@@ -26,7 +26,7 @@ from fxcrack.solve.linear_jumps import (
     bond_work,
     work_between,
 )
-from fxcrack.solve.softening import SoftBond
+from fxcrack.solve.soft_bond import SoftBond
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -19,7 +19,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.solve.cholesky import GrowingCholesky, NotPositiveDefinite
-from fxcrack.solve.softening import SoftBond, SoftSet
+from fxcrack.solve.soft_bond import SoftBond
+from fxcrack.solve.softening import SoftSet
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

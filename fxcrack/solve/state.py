@@ -12,7 +12,7 @@ import numpy.typing as npt
 from fxcrack.errors import InputError
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.rubbing import FrictionMemory
-from fxcrack.solve.softening import SoftBond
+from fxcrack.solve.soft_bond import SoftBond
 
 Array = npt.NDArray[np.float64]
 Arrays = dict[str, npt.NDArray[np.generic]]
@@ -27,7 +27,8 @@ def take_states(model: CondensedModel) -> Arrays:
 
     Returns:
         loads, shape (n_loads,); per pair p bonded[p], shape (n_nodes,), and jump[p] and what
-        :meth:`JumpSystem.state_dict` holds, shape (n_nodes, gdim); soft.* per softening bond;
+        :meth:`JumpSystem.state_dict` holds, shape (n_nodes, gdim); soft.* per softening
+        bond;
         friction.* per contact node if there is friction.
     """
     out: Arrays = {"loads": model.state.loads}
@@ -44,13 +45,15 @@ def take_states(model: CondensedModel) -> Arrays:
 
 
 def _take_bonds(model: CondensedModel) -> Arrays:
-    bonds, gdim = model.system.soft.bonds, model.continuum.gdim
-    direction = np.full((len(bonds), gdim), np.nan)  # NaN where a component does not soften
-    for row, bond in zip(direction, bonds, strict=True):
-        row[bond.where[2]] = bond.direction
+    bonds = model.system.soft.bonds
+    rows = [
+        (i, b.where[0], node, local)
+        for i, b in enumerate(bonds)
+        for node, local in zip(*b.where[1:], strict=True)
+    ]
     return {
-        "soft.where": np.array([b.where[:2] for b in bonds], dtype=np.int64).reshape(-1, 2),
-        "soft.direction": direction,
+        "soft.where": np.array(rows, dtype=np.int64).reshape(-1, 4),
+        "soft.direction": np.concatenate([np.zeros(0), *(b.direction for b in bonds)]),
         "soft.strength": np.array([b.strength for b in bonds], dtype=float),
         "soft.final": np.array([b.final for b in bonds], dtype=float),
         "soft.largest": np.array([np.nan if b.largest is None else b.largest for b in bonds]),
@@ -67,16 +70,15 @@ def give_bonds(model: CondensedModel, arrays: Arrays) -> None:
             held = np.flatnonzero(arrays[f"contact[{p}]"].any(axis=1))
             pressed += [(p, int(node)) for node in held]
     model.keep = [*model.keep, *pressed]
-    names = ("where", "direction", "strength", "final", "largest")
+    law = (arrays[f"soft.{name}"].astype(float) for name in ("strength", "final", "largest"))
+    rows, direction = arrays["soft.where"].astype(np.int64), arrays["soft.direction"].astype(float)
     bonds = []
-    for where, direction, strength, final, largest in zip(
-        *(arrays[f"soft.{name}"] for name in names), strict=True
-    ):
-        local = np.flatnonzero(~np.isnan(direction))
+    for i, (strength, final, largest) in enumerate(zip(*law, strict=True)):
+        mine = rows[:, 0] == i
+        _, pair, nodes, local = rows[mine].T
         bonds.append(
             SoftBond(
-                local, direction[local], float(strength), float(final),
-                (int(where[0]), int(where[1]), local),
+                local, direction[mine], float(strength), float(final), (int(pair[0]), nodes, local),
                 None if np.isnan(largest) else float(largest),
             )
         )  # fmt: skip

@@ -180,7 +180,7 @@ class Account:
                 continue
             if not len(ready):
                 continue
-            self._release(g, np.unique(v.tips.force_nodes[ready]), v)
+            self._release(g, g.nodes_of(v, ready), v)
         self._look()
         self._record("release")
 
@@ -195,13 +195,11 @@ class Account:
         viscosity = getattr(g.criterion, "viscosity", 0.0)
         ramp: Letting | None = None
         if g.opening_driven:
-            spend = g.energy_to_spend(nodes, values)
-            soft, energy = nodes[spend > 0.0], spend[spend > 0.0]
+            units = g.to_soften(nodes, values)
             if viscosity > 0.0:
-                ramp = ViscousSoftening.begin(self.model, g.p, soft, energy, viscosity, self.time)
+                ramp = ViscousSoftening.begin(self.model, g.p, units, viscosity, self.time)
             else:
-                self.model.soften(g.p, soft, energy)
-            self._open_at_once(g, nodes[spend <= 0.0])
+                self.model.soften(g.p, units)
         elif not isinstance(law, Step):
             now = self.time if law.driver == "time" else float(self.increment)
             ramp = TimedRelease.begin(self.model, g.p, nodes, law, now)

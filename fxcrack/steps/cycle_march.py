@@ -275,7 +275,7 @@ class CycleMarch(March):
         parts = np.split(jump.release, counts[:-1])
         for g, v, chosen in zip(self.growths, self._values, parts, strict=True):
             if chosen.any():
-                self._release(g, np.unique(v.tips.force_nodes[chosen]), v)
+                self._release(g, g.nodes_of(v, np.flatnonzero(chosen)), v)
         self._look()
 
     def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:

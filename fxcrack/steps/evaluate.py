@@ -23,9 +23,11 @@ from fxcrack.criteria import (
 from fxcrack.criteria.mixed_mode import total
 from fxcrack.criteria.vcct import closure_weights, weighted_rates
 from fxcrack.interface.front import Tips
+from fxcrack.interface.units import FrontUnits, edge_midsides, units_of
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.solve.soft_bond import SoftUnit
 from fxcrack.steps.interface_temperature import InterfaceTemperature
 
 Array = npt.NDArray[np.float64]
@@ -91,6 +93,8 @@ class RateEvaluator:
         p: Number of the pair.
         criterion: Criterion with toughness and mode mix.
         temperature: Temperature of the slave nodes; None without.
+        softens: Whether bonds soften with their opening: second-order fronts then let go by element
+            edges, and f is that of the edge.
     """
 
     degree = 2
@@ -103,10 +107,14 @@ class RateEvaluator:
         p: int,
         criterion: RateCriterion,
         temperature: InterfaceTemperature | None = None,
+        *,
+        softens: bool = False,
     ) -> None:
         self.model = model
         self.p = p
         self.criterion = criterion
+        self._edges = edge_midsides(model.fronts[p].surface) if softens else {}
+        self._grouped: tuple[Tips, FrontUnits] | None = None
         self._weighed: Tips | None = None
         self._weights = np.zeros((0, 1))
         surface = model.pairs[p].surface
@@ -153,8 +161,22 @@ class RateEvaluator:
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and GI, GII, GIII."""
         rates = self.rates(tips, measured)
-        f = self.criterion.ratio(rates, self._toughness(tips, measured))
-        return f, dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+        toughness = self._toughness(tips, measured)
+        report = dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+        if not self._edges:
+            return self.criterion.ratio(rates, toughness), report
+        units = self.units(tips)
+        n = units.shares.shape[1]
+        rates, toughness = (units.mean(v.reshape(-1, n, 3)) for v in (rates, toughness))
+        f = self.criterion.ratio(rates.reshape(-1, 3), toughness.reshape(-1, 3))
+        return units.at_tips(f.reshape(rates.shape[:2])).ravel(), report
+
+    def units(self, tips: Tips) -> FrontUnits:
+        """Tips that let go together; of tips that were repeated, those of the first time."""
+        if self._grouped is None or self._grouped[0] is not tips:
+            once = np.unique(tips.node).size
+            self._grouped = tips, units_of(self._edges, first_tips(tips, once))
+        return self._grouped[1]
 
     def _tip_temperature(self, tips: Tips, measured: Array | None) -> Array | None:
         if self._temperature is None:
@@ -171,16 +193,22 @@ class RateEvaluator:
         x = surface.x[tips.node, : self.model.continuum.gdim]
         return self.criterion.toughness_at(x, tips.node, measured[:, -1], n_slave=surface.n_nodes)
 
-    def energy_to_spend(self, nodes: Ints, values: TipValues, release: Release) -> Array:
-        """Energy that softening nodes dissipate until they are free, shape (n,).
+    def to_soften(self, nodes: Ints, values: TipValues, release: Release) -> list[SoftUnit]:
+        """Nodes that soften by one law each, and the energy it dissipates until they are free.
 
-        Each unit spends what its area asks for; 0 at nodes that have no part in it.
+        All nodes of a unit share a law: their forces, pressed ones included, fall in proportion,
+        and together they spend what the area of the unit asks for.
+
+        Args:
+            nodes: All nodes that let go now, shape (n,).
+            values: What the criterion says at the front they are part of.
+            release: How they let go.
 
         Raises:
             NotPositiveDefinite: A body would come free: without bound is what its last unit frees.
         """
         surface = self.model.fronts[self.p].surface
-        tips = values.tips
+        tips, units = values.tips, self.units(values.tips)
         rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
         toughness = self._toughness(tips, values.measured)
         if isinstance(self.criterion, EnhancedVCCT):
@@ -190,43 +218,29 @@ class RateEvaluator:
                 self._tip_temperature(tips, values.measured),
                 n_slave=surface.n_nodes,
             )
+        rates, toughness = units.mean(rates), units.mean(toughness)
         critical = self.criterion.critical(rates, toughness)
         if isinstance(release, Ramp) and not isinstance(self.criterion, EnhancedVCCT):
             # 1/2 F0 w_c with the opening of the wake: what crack closure calls G A
             critical = total(rates)
         if np.any(critical > UNBOUNDED_RATE * toughness[:, 0]):
-            raise NotPositiveDefinite(int(tips.node[np.argmax(critical)]))
-        out = np.zeros(len(nodes))
-        for unit, rate, shares in zip(
-            tips.force_nodes, critical, self._shares(values), strict=True
-        ):
-            whole = rate * surface.areas[np.unique(unit)].sum()
-            for node, share in zip(unit, shares, strict=True):
-                out[nodes == node] = share * whole
+            worst = units.leaders[np.argmax(critical)]
+            raise NotPositiveDefinite(int(tips.node[worst]))
+        out, left = [], np.unique(nodes)
+        # a corner row that two edges share goes with the one that is more critical; rows that are
+        # to go alone (fatigue) come last
+        order = np.argsort(-values.f[units.leaders], kind="stable")
+        groups = [(k, units.leaders[k], units.shares[k] > 0.0) for k in order]
+        for i in np.setdiff1d(np.arange(len(tips)), units.leaders):
+            groups.append((np.argmax(units.shares[:, i]), i, np.arange(len(tips)) == i))
+        for k, first, rows in groups:
+            if tips.node[first] not in left:
+                continue
+            unit = np.intersect1d(tips.force_nodes[rows], left)
+            left = np.setdiff1d(left, unit)
+            energy = float(critical[k] * surface.areas[unit].sum())
+            out.append(SoftUnit(unit, energy, bool(rates[k, 0] <= 0.0)))
         return out
-
-    def _shares(self, values: TipValues) -> Array:
-        """Part of a unit's energy that each of its nodes spends, shape (n, k).
-
-        That of its product F w in crack closure. On second-order faces the bond at the midside node
-        is often pressed while that of the corner pulls: all is the corner's then. Less than a
-        millionth counts as none: such a bond would be too brittle to follow.
-        """
-        tips, measured = values.tips, values.measured
-        assert measured is not None
-        n, k = tips.force_nodes.shape
-        force, opening = (
-            m.reshape(n, k, 3) for m in (measured[:, : 3 * k], measured[:, 3 * k : 6 * k])
-        )
-        products = force * opening
-        products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)
-        spent = np.maximum(products.sum(axis=2), 0.0)
-        spent[spent < 1e-6 * spent.max(axis=1, keepdims=True)] = 0.0
-        whole = spent.sum(axis=1, keepdims=True)
-        shares = np.divide(spent, whole, out=np.full((n, k), 1.0 / k), where=whole > 0.0)
-        # at the end of a surface the corner stands for both
-        shares[tips.force_nodes[:, 0] == tips.force_nodes[:, -1]] = 1.0
-        return np.asarray(shares)
 
     def needs(self, tips: Tips) -> Ints:
         """Nothing beyond the tips themselves."""
@@ -252,6 +266,13 @@ def repeat_tips(tips: Tips, times: int) -> Tips:
         return np.tile(a, (times,) + (1,) * (a.ndim - 1))
 
     return Tips(**{name: tile(getattr(tips, name)) for name in Tips.__dataclass_fields__})
+
+
+def first_tips(tips: Tips, n: int) -> Tips:
+    """The first tips alone."""
+    if n == len(tips):
+        return tips
+    return Tips(**{name: getattr(tips, name)[:n] for name in Tips.__dataclass_fields__})
 
 
 def first_crossing(

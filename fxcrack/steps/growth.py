@@ -27,6 +27,7 @@ from fxcrack.interface.path import SurfacePaths
 from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.solve.soft_bond import SoftUnit
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
 from fxcrack.steps.evaluate_distance import OpeningEvaluator, StressEvaluator
 from fxcrack.steps.evaluate_length import LengthEvaluator
@@ -134,7 +135,9 @@ class Growth:
         )
         self.front = model.fronts[p]
         self.extent = CrackExtent(self.front)
-        self.evaluator: Evaluator = make_evaluator(model, p, debond.criterion, debond.temperature)
+        self.evaluator: Evaluator = make_evaluator(
+            model, p, debond.criterion, debond.temperature, softens=softens(debond)
+        )
         self.watched = [make_evaluator(model, p, c, debond.temperature) for c in debond.watch]
         every = [self.evaluator, *self.watched]
         model.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
@@ -210,15 +213,31 @@ class Growth:
         """Whether bond forces fall with their opening."""
         return softens(self.debond)
 
-    def energy_to_spend(self, nodes: Ints, values: TipValues) -> Array:
-        """Energy that nodes which soften have to dissipate, shape (n,).
+    def nodes_of(self, values: TipValues, chosen: Ints) -> Ints:
+        """Nodes to let go where some tips are chosen: where bonds soften, by whole units.
 
-        Progressive release: the critical rate at the present mode mix times the node's area;
-        enhanced VCCT: that of propagation; ramp: half the force times the wake opening at onset.
+        Args:
+            values: What the criterion says at the front.
+            chosen: Positions of tips.
         """
-        evaluator = self.evaluator
-        assert isinstance(evaluator, RateEvaluator)
-        return evaluator.energy_to_spend(nodes, values, self.debond.release)
+        tips = values.tips
+        if self.opening_driven:
+            units = self._by_rates.units(tips)
+            chosen = np.union1d(chosen, np.nonzero(units.shares[np.isin(units.leaders, chosen)])[1])
+        return np.unique(tips.force_nodes[chosen])
+
+    def to_soften(self, nodes: Ints, values: TipValues) -> list[SoftUnit]:
+        """Nodes that soften by one law each, and the energy it dissipates until they are free.
+
+        Progressive release: the critical rate at the present mode mix times the area; enhanced
+        VCCT: that of propagation; ramp: half the force times the wake opening at onset.
+        """
+        return self._by_rates.to_soften(nodes, values, self.debond.release)
+
+    @property
+    def _by_rates(self) -> RateEvaluator:
+        assert isinstance(self.evaluator, RateEvaluator)
+        return self.evaluator
 
     def let_go(self, nodes: Ints, values: TipValues, state: Equilibrium, time: float) -> None:
         """Note nodes that are about to be released."""
@@ -231,6 +250,8 @@ def make_evaluator(
     p: int,
     criterion: Criterion,
     temperature: float | Callable[[Array], npt.ArrayLike] | None = None,
+    *,
+    softens: bool = False,
 ) -> Evaluator:
     """The evaluator that goes with a criterion; collective.
 
@@ -244,7 +265,7 @@ def make_evaluator(
     if isinstance(criterion, CrackLengthVsTime):
         return LengthEvaluator(model, p, criterion)
     if not isinstance(criterion, CriticalStress | CrackOpening):
-        return RateEvaluator(model, p, criterion, known)
+        return RateEvaluator(model, p, criterion, known, softens=softens)
     if known is not None and not known.steady:
         raise InputError(
             f"interface '{pair.title}': {type(criterion).__name__} cannot follow a temperature "

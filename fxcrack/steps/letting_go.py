@@ -13,6 +13,7 @@ from fxcrack.criteria import Release as ReleaseLaw
 from fxcrack.errors import InputError
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.rubbing import taken_over
+from fxcrack.solve.soft_bond import SoftUnit
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -118,16 +119,18 @@ class ViscousSoftening:
     Attributes:
         p: Number of the pair.
         nodes: Slave nodes, shape (n,).
+        unit: Number of the law of each of them, shape (n,).
         force: Force on the slave side at debonding in jump components, shape (n, gdim).
-        final: w_f, shape (n,), length.
+        final: w_f per law, shape (n_laws,), length.
         viscosity: mu, time.
         time: Time of the last accepted increment.
-        damage: D then, shape (n,).
-        lagging: D_v then, shape (n,).
+        damage: D then per law, shape (n_laws,).
+        lagging: D_v then per law, shape (n_laws,).
     """
 
     p: int
     nodes: Ints
+    unit: Ints
     force: Array
     final: Array
     viscosity: float
@@ -142,8 +145,7 @@ class ViscousSoftening:
         cls,
         model: CondensedModel,
         p: int,
-        nodes: Ints,
-        energy: Array,
+        units: Sequence[SoftUnit],
         viscosity: float,
         time: float,
     ) -> ViscousSoftening:
@@ -152,39 +154,42 @@ class ViscousSoftening:
         Args:
             model: The model.
             p: Number of the pair.
-            nodes: Slave nodes, shape (n,).
-            energy: Energy each of them is to dissipate without viscosity, shape (n,).
+            units: What softens by one law each.
             viscosity: mu, time.
             time: Present time.
         """
-        force = bond_forces_of(model, p, nodes)
-        size = np.maximum(np.linalg.norm(force, axis=1), np.finfo(float).tiny)
-        zero = np.zeros(len(nodes))
-        return cls(p, nodes, force, 2.0 * energy / size, viscosity, time, zero, zero.copy())
+        nodes = np.concatenate([u.nodes for u in units])
+        unit = np.repeat(np.arange(len(units)), [len(u.nodes) for u in units])
+        force, zero = bond_forces_of(model, p, nodes), np.zeros(len(units))
+        energy = np.array([u.energy for u in units])
+        final = 2.0 * energy / _sizes(force, unit)
+        return cls(p, nodes, unit, force, final, viscosity, time, zero, zero.copy())
 
     def fraction(self, now: float) -> Array:
         """Remaining fractions at the end of an increment, shape (n,)."""
+        return np.asarray(1.0 - self._lagging_at(now))[self.unit]
+
+    def _lagging_at(self, now: float) -> Array:
         dt = max(now - self.time, 0.0)
-        lagging = (dt * self.damage + self.viscosity * self.lagging) / (dt + self.viscosity)
-        return np.asarray(1.0 - lagging)
+        return (dt * self.damage + self.viscosity * self.lagging) / (dt + self.viscosity)
 
     def damage_at(self, model: CondensedModel, jump: Array) -> Array:
-        """D of a state, shape (n,): of the largest opening along the force at debonding."""
+        """D of a state, shape (n_laws,): of the largest opening along the force at debonding."""
         index = model.index[self.p][self.nodes]
         at = np.where(index >= 0, jump[np.maximum(index, 0)], 0.0)
-        size = np.maximum(np.linalg.norm(self.force, axis=1), np.finfo(float).tiny)
-        opening = -(self.force * at).sum(axis=1) / size
+        work = np.bincount(self.unit, (self.force * at).sum(axis=1), len(self.final))
+        opening = -work / _sizes(self.force, self.unit)
         return np.asarray(np.maximum(self.damage, np.clip(opening / self.final, 0.0, 1.0)))
 
     def fracture_energy(self, model: CondensedModel, jump: Array) -> float:
         """What the law without viscosity has spent up to a state, force times length."""
         left = 1.0 - self.damage_at(model, jump)
-        whole = 0.5 * np.linalg.norm(self.force, axis=1) * self.final
+        whole = 0.5 * _sizes(self.force, self.unit) * self.final
         return float(whole @ (1.0 - left**2))
 
     def accept(self, time: float, model: CondensedModel) -> None:
         """Go on from the end of an accepted increment."""
-        self.lagging = 1.0 - self.fraction(time)
+        self.lagging = self._lagging_at(time)
         self.damage, self.time = self.damage_at(model, model.state.jump), time
 
     def breaks(self) -> tuple[float, ...]:
@@ -194,6 +199,12 @@ class ViscousSoftening:
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time."""
         return time
+
+
+def _sizes(force: Array, unit: Ints) -> Array:
+    """Norms of the forces of each unit, never quite 0, shape (n_units,)."""
+    square = np.bincount(unit, (force**2).sum(axis=1))
+    return np.maximum(np.sqrt(square), np.finfo(float).tiny)
 
 
 Letting = TimedRelease | ViscousRelease | ViscousSoftening

@@ -348,12 +348,12 @@ class March(Account):
         system = self.model.system
         begin = self.time
         values = self._values
-        snaps = system.soft.snaps
+        snaps = system.soft.counts.snaps
         for fraction, point in self._along(target):
             here = self.model.state
             times = (self.time, begin + fraction * (target - begin))
-            if system.soft.snaps > snaps:
-                snaps = system.soft.snaps
+            if system.soft.counts.snaps > snaps:
+                snaps = system.soft.counts.snaps
                 # an unstable state was passed: no equilibrium lies in between
                 self._advance(here, point, times[1])
                 self._values = self._evaluate()

@@ -125,9 +125,9 @@ def bond_state(
     fraction = bonded.astype(float)
     state = growth.model.state
     for bond in growth.model.system.soft.bonds:
-        p, node, _ = bond.where
+        p, nodes, _ = bond.where
         if p == growth.p:
-            fraction[node] = bond.force(bond.opening(state.jump)) / bond.strength
+            fraction[nodes] = bond.force(bond.opening(state.jump)) / bond.strength
     for ramp in ramps:
         if ramp.p == growth.p:
             index = growth.model.index[ramp.p][ramp.nodes]

@@ -92,7 +92,7 @@ def flexure(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
     )
 
 
-def solid(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
+def solid(comm: MPI.Intracomm, order: int = 1, **options: Any) -> fx.Scene:
     """Opened more on one side than on the other: no two nodes of the front are alike."""
     ends = [
         fx.Displacement(f"end_{side}", y=lambda x, sign=sign: sign * (0.2 + 0.02 * x[2]))
@@ -100,7 +100,7 @@ def solid(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
     ]
     held = [fx.Displacement(f"far_{s}", x=0.0, y=0.0, z=0.0) for s in ("upper", "lower")]
     return fx.Scene(
-        dcb_3d(comm, length=20.0, width=3.0, dx=1.0, dy=1.0, ny=1),
+        dcb_3d(comm, length=20.0, width=3.0, dx=1.0, dy=1.0, ny=1, order=order),
         materials=fx.Isotropic(70e3, 0.3),
         model=fx.Solid(),
         supports=[*held, *ends],
@@ -206,6 +206,16 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     "3-D, progressive": (
         lambda comm: solid(comm, criterion=fx.VCCT(GIc=0.2), release=fx.Progressive()),
         [fx.Static(until=fx.Releases(12))],
+    ),
+    "3-D, progressive, second order": (
+        lambda comm: solid(comm, 2, criterion=fx.VCCT(GIc=0.2), release=fx.Progressive()),
+        [fx.Static(until=fx.Releases(30))],
+    ),
+    "3-D, viscosity, second order": (
+        lambda comm: solid(
+            comm, 2, criterion=fx.VCCT(GIc=0.2, viscosity=1e-2), release=fx.Progressive()
+        ),
+        [fx.Static(until=fx.Releases(20), initial=0.02, maximum=0.02, **INCREMENTS)],
     ),
 }
 

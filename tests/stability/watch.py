@@ -9,7 +9,7 @@ from specimens import gathered, gathered_vector
 
 import fxcrack as fx
 from fxcrack.output.history import Row
-from fxcrack.solve.softening import SoftBond
+from fxcrack.solve.soft_bond import SoftBond
 
 PENETRATION = 1e-10  # of the largest jump: asked for
 FORCE = 1e-11  # of the sum of |stiffness| |displacement| a force is the difference of: round-off
