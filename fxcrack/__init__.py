@@ -45,8 +45,8 @@ from fxcrack.output.fields import FieldSeries, displacement_function, write_fiel
 from fxcrack.output.history import History
 from fxcrack.output.report import tip_table, write_tip_table
 from fxcrack.scene import Debond, Scene
-from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.solve.newton import NewtonOptions
+from fxcrack.solve.options import CondensedOptions
 from fxcrack.steps.fatigue import Cycles
 from fxcrack.steps.static import Dynamic, Static
 from fxcrack.steps.until import CrackLength, Releases, Time

@@ -24,8 +24,9 @@ from fxcrack.output.checkpoint import Checkpoint
 from fxcrack.output.explain import Explanation, explain
 from fxcrack.output.history import History, Row
 from fxcrack.output.progress import Progress
-from fxcrack.solve.condensed import CondensedModel, CondensedOptions
+from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.newton import NewtonOptions
+from fxcrack.solve.options import CondensedOptions
 from fxcrack.steps.cycle_march import CycleMarch
 from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
 from fxcrack.steps.growth import Debond, Growth, check_friction

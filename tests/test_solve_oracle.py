@@ -367,7 +367,7 @@ def test_transformed_matrix_with_its_borders(comm: MPI.Intracomm, name: str) -> 
         expected[:, first + i] += t.T @ border
     matrix = gathered(found.matrix).toarray()
     assert np.abs(matrix - expected).max() < 1e-13 * np.abs(expected).max()  # round-off of sums
-    assert scene.model._face_loads == pytest.approx(
+    assert scene.model.face_loads == pytest.approx(
         -np.stack([t.T @ b for b in borders[: len(scene.loads)]], axis=1)[
             found.coordinates.first : found.coordinates.first + found.coordinates.n_window
         ],

@@ -16,6 +16,7 @@ import fxcrack as fx
 from fxcrack.criteria import closure_rates, energy_release_rates
 from fxcrack.criteria.rate_criterion import NORMALISATIONS
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
+from fxcrack.solve.tips import bond_forces, closure_jumps, openings
 
 pytestmark = pytest.mark.verification
 
@@ -38,15 +39,15 @@ def rates(x: Array) -> tuple[Array, dict[str, Array]]:
         if length > LAST:
             break
         lengths.append(length)
-        force = model.bond_forces(0, tips, model.state)
-        opening = model.openings(0, tips, model.state)
+        force = bond_forces(model, 0, tips, model.state)
+        opening = openings(model, 0, tips, model.state)
         scale = 1.0 / model.state.loads[1] ** 2
         for name in NORMALISATIONS:
             g = energy_release_rates(
                 force, opening, tips.d_ahead, tips.d_behind, tips.width, normalisation=name
             )
             found[name].append(scale * g[0, 0])
-        jumps = model.closure_jumps(0, tips, force)
+        jumps = closure_jumps(model, 0, tips, force)
         found["closure"].append(scale * closure_rates(force, jumps, tips.area)[0, 0])
         model.release(0, tips.node, np.zeros(model.system.n_window))
     return np.array(lengths), {name: np.array(g) for name, g in found.items()}

@@ -18,7 +18,7 @@ from fxcrack.output.history import History, Row
 
 if TYPE_CHECKING:
     from fxcrack.scene import Scene
-    from fxcrack.solve.condensed import CondensedOptions
+    from fxcrack.solve.options import CondensedOptions
     from fxcrack.steps.fatigue import Cycles
     from fxcrack.steps.static import Static
     from fxcrack.steps.until import Until
@@ -97,7 +97,7 @@ class Setting:
 
     def options(self) -> CondensedOptions:
         """Options of the scene."""
-        from fxcrack.solve.condensed import CondensedOptions
+        from fxcrack.solve.options import CondensedOptions
 
         return CondensedOptions(method=self.solver)
 

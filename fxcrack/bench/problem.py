@@ -22,7 +22,7 @@ from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.models import PlaneStrain, Solid
 from fxcrack.output.history import Row
 from fxcrack.scene import Scene
-from fxcrack.solve.condensed import CondensedOptions
+from fxcrack.solve.options import CondensedOptions
 from fxcrack.steps.growth import Debond
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength

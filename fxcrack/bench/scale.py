@@ -30,8 +30,8 @@ from fxcrack.bench.rates import dense_rate, message_rate, unshared_rate
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_3d
-from fxcrack.solve.condensed import CondensedOptions
 from fxcrack.solve.machine import machine_name
+from fxcrack.solve.options import CondensedOptions
 from fxcrack.steps.static import Static
 from fxcrack.steps.until import CrackLength
 

@@ -29,9 +29,10 @@ from fxcrack.interface.surface import gather_surface
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve import newton
 from fxcrack.solve.condensation import Condensation, border_vectors
-from fxcrack.solve.condensed import CondensedModel, CondensedOptions
+from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
 from fxcrack.solve.newton import Counts, InterfaceProblem, NewtonOptions
+from fxcrack.solve.options import CondensedOptions
 from fxcrack.solve.rigid import check_held
 from fxcrack.solve.rubbing import Slide
 from fxcrack.terms.bodies import Bodies
@@ -167,7 +168,7 @@ class NewtonModel(CondensedModel):
         residual = self._out_of_balance(loads)
         self._anchor(residual, self._base, loads)
         residual.destroy()
-        self._face_loads = -self.condensation.borders_on_window[:, : len(self.loads)]
+        self.face_loads = -self.condensation.borders_on_window[:, : len(self.loads)]
 
     @property
     def condensation(self) -> Condensation:

@@ -28,6 +28,7 @@ from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.soft_bond import SoftUnit
+from fxcrack.solve.tips import bond_forces, closure_jumps, openings
 from fxcrack.steps.interface_temperature import InterfaceTemperature
 
 Array = npt.NDArray[np.float64]
@@ -130,11 +131,11 @@ class RateEvaluator:
 
         A last column holds the temperature of the tips where it changes in time.
         """
-        force = self.model.bond_forces(self.p, tips, state)
+        force = bond_forces(self.model, self.p, tips, state)
         if self.criterion.method == "closure":
-            opening = self.model.closure_jumps(self.p, tips, force)
+            opening = closure_jumps(self.model, self.p, tips, force)
         else:
-            opening = self.model.openings(self.p, tips, state)
+            opening = openings(self.model, self.p, tips, state)
             if force.shape[1] == 2:
                 # on a ring the midside force belongs to its own circumference
                 breadth = self.model.fronts[self.p].surface.breadth

@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.solve.tips import openings
 from fxcrack.steps.evaluate import TipValues
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def release_records(
         time: Time.
     """
     tips, model = values.tips, growth.model
-    openings = model.openings(growth.p, tips, state)
+    opened = openings(model, growth.p, tips, state)
     index = model.index[growth.p][nodes]
     rows = np.unique(index[index >= 0])
     held = np.zeros(model.system.n_window)
@@ -76,7 +77,7 @@ def release_records(
         frame = tips.frame[i]
         out.append(
             ReleaseRecord(
-                int(node), float(time), float(values.f[i]), _three(rates), _three(openings[i, 0]),
+                int(node), float(time), float(values.f[i]), _three(rates), _three(opened[i, 0]),
                 _three(stress @ frame), frame,
             )
         )  # fmt: skip

@@ -1,0 +1,101 @@
+"""Forces, openings and jumps at the tips, as criteria ask for them."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_solve
+
+from fxcrack.interface.front import Tips
+from fxcrack.solve.cholesky import NotPositiveDefinite
+from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.solve.window_model import WindowModel
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+_UNBOUNDED = 1e100
+"""Jump per force of a unit that holds a body alone."""
+
+
+def bond_forces(model: WindowModel, p: int, tips: Tips, state: Equilibrium) -> Array:
+    """Tension-positive bond forces at the tips in the tip frames, shape (n, k, 3).
+
+    Loads on the crack faces are carried on to the faces that would open.
+    """
+    index = model.index[p][tips.force_nodes]
+    rows = np.unique(index[index >= 0])
+    values = np.zeros(model.system.n_window)
+    values[rows] = -model.system.forces(state, rows)
+    vectors = model.vectors(p, tips.force_nodes, values)
+    if np.any(model.face_loads):
+        vectors = vectors + _loads_to_come(model, p, tips, state)
+    out = np.einsum("nci,nkc->nki", tips.frame, vectors)
+    if tips.force_nodes.shape[1] > 1:
+        # at the end of a surface there is no midside node ahead
+        out[tips.force_nodes[:, 0] == tips.force_nodes[:, 1], 1] = 0.0
+    return np.asarray(out)
+
+
+def _loads_to_come(model: WindowModel, p: int, tips: Tips, state: Equilibrium) -> Array:
+    """Load on the faces the crack is about to open, if that of the wake goes on there.
+
+    A pressure p on the faces leaves the bond forces short by p times the part of the tip's
+    tributary area that is still bonded (as superposing the uniform stress -p shows); without
+    this the error of G goes with the square root of the element size only.
+
+    Returns:
+        Global vectors per force node, shape (n, k, 3).
+    """
+    areas = model.pairs[p].surface.areas
+    loads = model.face_loads @ state.loads[model.n_loads - len(model.loads) :]
+    wake = model.vectors(p, tips.wake_nodes, loads).sum(axis=(1, 2))
+    density = wake / areas[tips.wake_nodes].sum(axis=(1, 2))[:, None]
+    whole = areas[tips.force_nodes][..., None] * density[:, None]
+    present = model.vectors(p, tips.force_nodes, loads)
+    to_come = whole - present
+    to_come[~np.any(density, axis=1)] = 0.0
+    return np.asarray(to_come)
+
+
+def openings(model: WindowModel, p: int, tips: Tips, state: Equilibrium) -> Array:
+    """Openings behind the tips in the tip frames, shape (n, k, 3), length."""
+    jump = model.vectors(p, tips.wake_nodes, state.jump)
+    jump = np.einsum("nkm,nkmc->nkc", tips.wake_weights, jump)
+    return np.asarray(np.einsum("nci,nkc->nki", tips.frame, jump))
+
+
+def closure_jumps(model: WindowModel, p: int, tips: Tips, force: Array) -> Array:
+    """Jumps that letting each unit go alone would open, shape (n, k, 3), length.
+
+    Args:
+        model: The model.
+        p: Number of the pair.
+        tips: Front nodes.
+        force: Their bond forces in tip frames, shape (n, k, 3).
+    """
+    out = np.zeros_like(force)
+    gdim = model.continuum.gdim
+    for i in range(len(tips)):
+        nodes = np.unique(tips.force_nodes[i])
+        index = model.index[p][nodes]
+        slot = index >= 0
+        if force[i, : len(nodes), 0].sum() <= 0.0:
+            slot[:, 0] = False  # pressed together: it stays closed, shear alone is released
+        star = model.system.reduced(index[slot])
+        try:
+            factor = model.system.cholesky.factorise(star, index[slot])
+        except NotPositiveDefinite:
+            factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
+        vector = np.einsum("ci,ki->kc", tips.frame[i], force[i, : len(nodes)])
+        order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
+        local = np.einsum("kci,kc->ki", model.frames[p][nodes[order]], vector[:, :gdim])
+        right = np.zeros((len(nodes), gdim))
+        right[order] = local
+        jump = np.zeros((len(nodes), gdim))
+        jump[slot] = cho_solve((factor, True), right[slot])
+        jump = jump[order]
+        world = np.zeros((len(nodes), 3))
+        world[:, :gdim] = np.einsum("kci,ki->kc", model.frames[p][nodes[order]], jump)
+        out[i, : len(nodes)] = world @ tips.frame[i]
+    return out
