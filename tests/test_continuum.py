@@ -20,7 +20,7 @@ from fxcrack.materials import strain_rotation
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.penny import penny
-from fxcrack.solve.condensation import border_vectors
+from fxcrack.solve.borders import border_vectors
 
 Array = npt.NDArray[np.float64]
 

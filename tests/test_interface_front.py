@@ -11,8 +11,9 @@ from specimens import tensor_surface
 
 from fxcrack.errors import InterfaceError
 from fxcrack.interface.extent import CrackExtent
-from fxcrack.interface.front import Front, Tips
+from fxcrack.interface.front import Front
 from fxcrack.interface.surface import FacetSurface
+from fxcrack.interface.tip import Tips
 
 Array = npt.NDArray[np.float64]
 

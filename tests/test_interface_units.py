@@ -9,7 +9,7 @@ from specimens import specimen
 
 import fxcrack as fx
 from fxcrack.demos import front3d
-from fxcrack.interface.front import Tips
+from fxcrack.interface.tip import Tips
 from fxcrack.interface.units import edge_midsides, units_of
 from fxcrack.meshes.dcb import dcb_3d
 

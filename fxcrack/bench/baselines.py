@@ -25,8 +25,9 @@ from fxcrack.bench.problem import Problem
 from fxcrack.criteria import RateCriterion, energy_release_rates
 from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
-from fxcrack.interface.front import Front, Tips
+from fxcrack.interface.front import Front
 from fxcrack.interface.jumps import JumpCoordinates, build_coordinates
+from fxcrack.interface.tip import Tips
 from fxcrack.scene import Scene
 from fxcrack.solve.window import CostModel, choose_roles
 

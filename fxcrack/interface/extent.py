@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.interface.front import Front, Tips
+from fxcrack.interface.front import Front
+from fxcrack.interface.tip import Tips
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

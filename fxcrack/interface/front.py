@@ -9,14 +9,12 @@ interpolated there. Second-order surfaces use the corner-midside-corner lines of
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.errors import InterfaceError
 from fxcrack.interface.surface import FacetSurface
+from fxcrack.interface.tip import Tip, Tips, cross, gradient, norm
 from fxcrack.mesh.raw import place
 
 Array = npt.NDArray[np.float64]
@@ -33,52 +31,6 @@ _LINES = {
     "interval": ((0, 2, 1),),
     "quadrilateral": ((0, 4, 1), (2, 7, 3), (0, 5, 2), (1, 6, 3), (5, 8, 6), (4, 8, 7)),
 }
-
-
-@dataclass(frozen=True)
-class Tip:
-    """One front node and what surrounds it.
-
-    Attributes:
-        node: Slave node.
-        force_nodes: Nodes whose bond forces count, and that are released together, shape (k,).
-        wake_nodes: Two nodes per wake point, shape (k, 2).
-        wake_weights: Their weights, shape (k, 2).
-        frame: Columns n, s (growth direction), t (front tangent), shape (3, 3).
-        d_ahead: Distance to the next node along s, 0 at the end of the surface, length.
-        d_behind: Distance to the wake point, length.
-        width: Front length (times thickness or ring) the node stands for, length.
-        area: Area that opens when the node is released, length^2.
-    """
-
-    node: int
-    force_nodes: Ints
-    wake_nodes: Ints
-    wake_weights: Array
-    frame: Array
-    d_ahead: float
-    d_behind: float
-    width: float
-    area: float
-
-
-@dataclass(frozen=True)
-class Tips:
-    """Several tips as arrays, first axis n_tips; fields as in :class:`Tip`."""
-
-    node: Ints
-    force_nodes: Ints
-    wake_nodes: Ints
-    wake_weights: Array
-    frame: Array
-    d_ahead: Array
-    d_behind: Array
-    width: Array
-    area: Array
-
-    def __len__(self) -> int:
-        """Number of tips."""
-        return len(self.node)
 
 
 class Front:
@@ -161,7 +113,7 @@ class Front:
         mixed = (indicator[corner].sum(axis=1) > 0) & (indicator[corner].sum(axis=1) < s.n_corners)
         if not mixed.any():
             return np.zeros((s.n_nodes, 3))
-        direction = np.array([-self._gradient(int(f), indicator)[0] for f in np.flatnonzero(mixed)])
+        direction = np.array([-gradient(s, int(f), indicator)[0] for f in np.flatnonzero(mixed)])
         direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
         centre = s.x[corner[mixed]].mean(axis=1)
         distance = np.linalg.norm(s.x[:, None] - centre[None], axis=2)
@@ -262,25 +214,6 @@ class Front:
             self._cache[node] = found
         return found
 
-    def _gradient(self, facet: int, indicator: Array) -> tuple[Array, float]:
-        """Gradient of a nodal indicator at a facet's centre, and the facet's size."""
-        s = self.surface
-        corner = s.facets[facet, : s.n_corners]
-        x, v = s.x[corner], indicator[corner]
-        if s.kind == "interval":
-            along = x[1] - x[0]
-            square = float(along @ along)
-            return (v[1] - v[0]) / square * along, math.sqrt(square)
-        if s.kind == "triangle":
-            a, b = np.stack([x[1] - x[0], x[2] - x[0]]), np.array([v[1] - v[0], v[2] - v[0]])
-        else:
-            a = 0.5 * np.stack([x[1] + x[3] - x[0] - x[2], x[2] + x[3] - x[0] - x[1]])
-            b = 0.5 * np.array([v[1] + v[3] - v[0] - v[2], v[2] + v[3] - v[0] - v[1]])
-        (aa, ab), (_, bb) = (a @ a.T).tolist()
-        square = aa * bb - ab * ab
-        c0, c1 = bb * b[0] - ab * b[1], aa * b[1] - ab * b[0]
-        return np.asarray((c0 * a[0] + c1 * a[1]) / square), math.sqrt(square)
-
     def _growth(self, node: int) -> Array:
         """Unit growth direction in the tangent plane."""
         s = self.surface
@@ -288,23 +221,23 @@ class Front:
         total = np.zeros(3)
         scale = 0.0
         for facet in self._facets_of[node]:
-            gradient, size = self._gradient(int(facet), indicator)
-            total -= size * gradient
-            scale += size * _norm(gradient)
+            slope, size = gradient(s, int(facet), indicator)
+            total -= size * slope
+            scale += size * norm(slope)
         normal = s.normals[node]
         total -= (total @ normal) * normal
-        length = _norm(total)
+        length = norm(total)
         if length < 1e-6 * max(scale, 1e-300):
             # open on all sides: grow away from the first open neighbour
             behind = next(k for k in self.neighbours(node) if not self.bonded[k])
             total = s.x[node] - s.x[behind]
             total -= (total @ normal) * normal
-            length = _norm(total)
+            length = norm(total)
         return np.asarray(total / length)
 
     def _frame(self, node: int, growth: Array) -> Array:
         normal = -self.surface.normals[node]
-        return np.array([normal, growth, _cross(normal, growth)]).T
+        return np.array([normal, growth, cross(normal, growth)]).T
 
     def _tip(self, node: int) -> Tip:
         s = self.surface
@@ -328,7 +261,7 @@ class Front:
         origin = s.x[node]
         best: tuple[float, Ints, Array] | None = None
         if s.dim == 2:
-            side = _cross(s.normals[node], direction)
+            side = cross(s.normals[node], direction)
             for facet in self._facets_of[node]:
                 corner = s.facets[facet, : s.n_corners]
                 for a, b in _EDGES[s.kind]:
@@ -396,14 +329,3 @@ class Front:
             np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth), d_ahead, d_behind,
             width, across * d_ahead if d_ahead > 0.0 else 0.5 * width * d_behind,
         )  # fmt: skip
-
-
-def _norm(a: Array) -> float:
-    """Length of one vector; numpy's own takes ten times as long on three numbers."""
-    return math.sqrt(float(a @ a))
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Product of two vectors; likewise."""
-    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
-    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])

@@ -17,8 +17,9 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.interface.front import Front, Tips
+from fxcrack.interface.front import Front
 from fxcrack.interface.projection import project
+from fxcrack.interface.tip import Tips
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.interface.front import Tips
 from fxcrack.interface.surface import FacetSurface
+from fxcrack.interface.tip import Tips
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]

@@ -28,7 +28,8 @@ from fxcrack.interface.supports import Supports
 from fxcrack.interface.surface import gather_surface
 from fxcrack.loads import Load, Monitor
 from fxcrack.solve import newton
-from fxcrack.solve.condensation import Condensation, border_vectors
+from fxcrack.solve.borders import border_vectors
+from fxcrack.solve.condensation import Condensation
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem, bond_work
 from fxcrack.solve.newton import Counts, InterfaceProblem, NewtonOptions

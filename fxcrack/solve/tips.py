@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_solve
 
-from fxcrack.interface.front import Tips
+from fxcrack.interface.tip import Tips
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.window_model import WindowModel

@@ -20,8 +20,9 @@ from fxcrack.interface.jumps import JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.loads import Load, Monitor
+from fxcrack.solve.borders import border_vectors
 from fxcrack.solve.cholesky import NotPositiveDefinite
-from fxcrack.solve.condensation import Condensation, Timings, border_vectors
+from fxcrack.solve.condensation import Condensation, Timings
 from fxcrack.solve.cost import too_large_for_direct
 from fxcrack.solve.iterative_condensation import ColumnStore, IterativeCondensation, Roles
 from fxcrack.solve.jump_system import Equilibrium, JumpSystem

@@ -23,7 +23,7 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.criteria import CycleJump, Fatigue, Paris, Regime, cycle_jump, total
-from fxcrack.interface.front import Tips
+from fxcrack.interface.tip import Tips
 from fxcrack.output.history import History
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium

@@ -22,7 +22,7 @@ from fxcrack.criteria import (
 )
 from fxcrack.criteria.mixed_mode import total
 from fxcrack.criteria.vcct import closure_weights, weighted_rates
-from fxcrack.interface.front import Tips
+from fxcrack.interface.tip import Tips
 from fxcrack.interface.units import FrontUnits, edge_midsides, units_of
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.condensed import CondensedModel

@@ -20,8 +20,8 @@ from fxcrack import log
 from fxcrack.criteria import CrackOpening, CriticalStress
 from fxcrack.criteria.path import locate
 from fxcrack.errors import InputError
-from fxcrack.interface.front import Tips
 from fxcrack.interface.path import SurfacePaths, Way
+from fxcrack.interface.tip import Tips
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 

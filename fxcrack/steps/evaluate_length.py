@@ -18,8 +18,8 @@ from mpi4py import MPI
 
 from fxcrack import log
 from fxcrack.criteria import CrackLengthVsTime
-from fxcrack.interface.front import Tips
 from fxcrack.interface.path import Origins, SurfacePaths
+from fxcrack.interface.tip import Tips
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 

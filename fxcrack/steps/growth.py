@@ -21,9 +21,9 @@ from fxcrack.criteria import (
 )
 from fxcrack.errors import InputError
 from fxcrack.interface.extent import CrackExtent
-from fxcrack.interface.front import Tips
 from fxcrack.interface.pairing import Interface, Pair
 from fxcrack.interface.path import SurfacePaths
+from fxcrack.interface.tip import Tips
 from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
