@@ -106,7 +106,11 @@ class Front:
             self.bonded[facets[loose, 2]] = False
 
     def _initial_heading(self) -> Array:
-        """Growth direction of the nearest initial front facet, per node, shape (n_nodes, 3)."""
+        """Growth direction per node, shape (n_nodes, 3).
+
+        That of the initial front nearest to it, averaged over a few of its facets: one facet alone
+        may lie on the side of a step of the front.
+        """
         s = self.surface
         indicator = (~self.bonded).astype(float)
         corner = s.facets[:, : s.n_corners]
@@ -117,7 +121,13 @@ class Front:
         direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
         centre = s.x[corner[mixed]].mean(axis=1)
         distance = np.linalg.norm(s.x[:, None] - centre[None], axis=2)
-        return np.asarray(direction[np.argmin(distance, axis=1)])
+        beyond = (distance - distance.min(axis=1, keepdims=True)) / (2.0 * s.facet_size)
+        mean = np.exp(-(beyond**2)) @ direction
+        length = np.linalg.norm(mean, axis=1, keepdims=True)
+        # opposite fronts at one distance: no mean, the first of them
+        lost = length < 0.5 * np.exp(-(beyond**2)).sum(axis=1, keepdims=True)
+        nearest = direction[np.argmin(distance, axis=1)]
+        return np.where(lost, nearest, mean / np.maximum(length, 1e-300))
 
     def follow(self, x: Array) -> None:
         """Take the slave nodes at other positions: the current configuration.
