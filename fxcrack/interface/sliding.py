@@ -3,7 +3,9 @@
     n . (x_s - sum_m W_m x_m) >= 0,    x = X + u,    W and n those of the projection of x_s
 
 In the unknowns of the jump coordinates this is delta_n + g >= 0 with g = n . (X_s - sum W_m X_m).
-Bonded nodes keep the master point they are bonded to.
+n is the master's normal, interpolated from those of its nodes: over a facet it is on the mean that
+of the facet, so that contact forces do no work on what slides over it. Bonded nodes keep the master
+point they are bonded to.
 """
 
 from __future__ import annotations
@@ -45,9 +47,9 @@ def renewed(
     x, y = pair.surface.x.copy(), master.x.copy()
     x[:, :gdim] += u_slave
     y[:, :gdim] += u_master
-    slave, now = pair.surface.moved(x), master.moved(y)
+    now = master.moved(y)
     foot = project(x, now)
-    normals = -slave.normals
+    normals = foot.normal
     away = x - foot.foot
     gap = np.einsum("nc,nc->n", away, normals)
     aside = np.linalg.norm(away - gap[:, None] * normals, axis=1)

@@ -89,7 +89,8 @@ class NewtonModel(CondensedModel):
         counts: Solves and iterations so far.
         force_scale: Norm of the internal forces at the last residual.
         round_off: Residual that rounding alone may leave there.
-        at: Time of the last trial.
+        at: Time of the accepted state.
+        pairing_energy: Energy that new pairings of faces that slide have taken so far.
     """
 
     linear = False
@@ -124,6 +125,7 @@ class NewtonModel(CondensedModel):
         self._base = np.zeros(0)
         self._moved = False  # whether the tangent is that of a trial
         self._version: tuple[int, ...] = ()  # of the terms whose tangent is factored
+        self._trial_at = 0.0
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._current = bodies.finite
         self._masters = [
@@ -136,6 +138,7 @@ class NewtonModel(CondensedModel):
         self._reader = JumpReader(continuum, pairs, [m for m in self._masters if m is not None])
         self._trial: PETSc.Vec | None = None
         self.last_move: Move | None = None
+        self.pairing_energy = 0.0
 
     # -- the window and its tangent ------------------------------------------------------
 
@@ -346,7 +349,7 @@ class NewtonModel(CondensedModel):
         """
         here = self.state
         saved = self.system.snapshot()
-        self.at = at
+        self._trial_at = at
         dynamic = self.bodies.dynamic
         self._begun = dt > 0.0 or not dynamic
         if self._begun:
@@ -436,6 +439,7 @@ class NewtonModel(CondensedModel):
         """The last trial becomes the accepted state; collective."""
         assert self._trial is not None and self.last_move is not None
         self._trial.copy(self.u)
+        self.at = self._trial_at
         self._moved = False
         self.state = self.last_move.end
         self._base = self.state.jump.copy()
@@ -505,6 +509,30 @@ class NewtonModel(CondensedModel):
         self.move(self.state.loads, force, self.at, 0.0, follow=False)
         self.accept()
 
+    def settle(self, force: Array) -> float:
+        """Find the equilibrium of a new pairing at constant loads, shape (n_window,); collective.
+
+        Contact forces move to the master points of the new pairing, and gaps that are not zero in
+        it close. The work of the interfaces on the way, by the trapezoidal rule, less what friction
+        and bonds take, is :attr:`pairing_energy`.
+
+        Returns:
+            External work.
+        """
+        here, before = self.state, self.nodal_forces(self.u)
+        step = self.u.copy()
+        self.solve(force)
+        work, released, _ = self.along(here, self.state)
+        self.rub(here, self.state)
+        after = self.nodal_forces(self.u)
+        before.axpy(1.0, after)
+        step.aypx(-1.0, self.u)
+        assert self.last_move is not None
+        self.pairing_energy -= 0.5 * float(before.dot(step)) + released + self.last_move.friction
+        for vector in (before, step, after):
+            vector.destroy()
+        return work
+
     def prepare(self, active: list[bool], reach: list[float]) -> None:
         """Build the window for a step, as for a linear continuum."""
         old = self._numbered()
@@ -541,7 +569,10 @@ class NewtonModel(CondensedModel):
 
     def spent(self) -> dict[str, float]:
         """Energies the bodies have turned into something else, by name; collective."""
-        return self.bodies.spent()
+        spent = self.bodies.spent()
+        if any(m is not None for m in self._masters):
+            spent["pairing_energy"] = self.pairing_energy
+        return spent
 
     def extra_work(self, state: Equilibrium) -> float:
         """Work of loads that follow the bodies and of a temperature; collective."""
@@ -558,17 +589,28 @@ class NewtonModel(CondensedModel):
     def remember(self) -> Any:
         """What :meth:`recall` needs: interface states, displacement, state of the terms."""
         terms = [term.state() for term in self.bodies.terms]
-        return self.system.snapshot(), self.u.array.copy(), terms
+        books = self.at, self.pairing_energy
+        pairs = list(self.pairs), [index.copy() for index in self.index]
+        return self.system.snapshot(), self.u.array.copy(), terms, books, pairs
 
     def recall(self, saved: Any) -> None:
         """Return to an earlier accepted state; ``state`` is the caller's to set before."""
-        states, u, terms = saved
+        states, u, terms, books, (pairs, numbers) = saved
         self.u.array[:] = u
+        self.at, energy = books
         for term, kept in zip(self.bodies.terms, terms, strict=True):
             term.restore(kept)
         self._moved = True
-        self._base = self.state.jump.copy()
-        self.reject(states)
+        if all(a is b for a, b in zip(pairs, self.pairs, strict=True)):
+            self._base = self.state.jump.copy()
+            self.reject(states)
+        else:
+            self.pairs[:] = pairs
+            self._soft, self._taken = states.bonds, states.finished
+            self._rebase()
+            self._renumber(numbers, self.state)
+            self.solve(self.state.force)
+        self.pairing_energy = energy
 
     def _back(self) -> None:
         """Dense system and bodies at the accepted state again."""

@@ -125,7 +125,7 @@ class NewtonMarch(March):
     def _renew(self) -> None:
         """Renew the pairing of faces that have slid, where the bodies move far."""
         if self.model.renew_pairs():
-            self.model.solve(self._force_at(self.time))
+            self.work += self.model.settle(self._force_at(self.time))
             self._values = self._evaluate()
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
