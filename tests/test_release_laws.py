@@ -132,6 +132,28 @@ def test_enhanced_vcct_with_equal_toughness_is_progressive_vcct():
     np.testing.assert_allclose(a["R[pin_top.y]"], b["R[pin_top.y]"], rtol=1e-12)
 
 
+@pytest.mark.parametrize("order", [1, 2])
+def test_softening_from_exact_closure_is_step_release_and_says_so(order, caplog):
+    histories = []
+    for release in (fx.Step(), fx.Progressive()):
+        caplog.clear()
+        mesh = dcb_2d(length=60.0, dx=1.0, ny=2, order=order)
+        criterion = fx.VCCT(GIc=TOUGHNESS, method="closure")
+        scene = specimen(mesh, a0=30.0, criterion=criterion, release=release)
+        histories.append(scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 36.0))))
+        assert ("runs open at once, as with Step" in caplog.text) == (len(histories) == 2)
+        scene.close()
+    step, soft = histories
+    # every bond is neutral at its onset, and every one of them goes
+    assert soft["event"].tolist()[1:-3] == ["onset", "release", "snap"] * 5
+    for column in ("R[pin_top.y]", "u[pin_top.y]", "a[bond]", "released_energy"):
+        here, there = ([row[column] for row in onsets(h)] for h in (soft, step))
+        # the last bit of a neutral bond's opening is found to 1e-10 of it
+        np.testing.assert_allclose(here, there, rtol=1e-8, atol=1e-12)
+    spent = [row["released_energy"] for row in onsets(soft)]
+    assert spent == pytest.approx(TOUGHNESS * np.arange(6.0), rel=1e-9, abs=1e-12)
+
+
 def test_softening_bond_unloads_along_its_secant_and_loads_again():
     scene, _ = beam(fx.Progressive())
     scene.run(fx.Static(until=fx.Releases(1)))

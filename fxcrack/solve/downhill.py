@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.errors import ComesApart
-from fxcrack.solve.soft_bond import STIFFEST
+from fxcrack.solve.soft_bond import NEUTRAL, STIFFEST
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -100,7 +100,7 @@ def _direction(
     opens = opens.copy()
     while True:
         curvature = stiffness + np.diag(np.where(opens, -slope, secant))
-        values, vectors = np.linalg.eigh(curvature)
+        values, vectors = np.linalg.eigh(curvature - np.diag(np.where(opens, NEUTRAL * slope, 0.0)))
         stable = values[0] > max(least, 1e-15 * values[-1])
         if stable:
             direction = -np.linalg.solve(curvature, gradient)

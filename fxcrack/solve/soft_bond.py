@@ -20,6 +20,10 @@ Ints = npt.NDArray[np.int64]
 STIFFEST = 1e-7
 """The secant of a bond that unloads at once is that of this fraction of its final opening."""
 
+NEUTRAL = 1e-8
+"""A state counts as unstable if it were so with bonds that soften faster by this fraction. A bond
+whose onset is found by exact crack closure is neutral there: round-off must not decide."""
+
 
 class SoftUnit(NamedTuple):
     """Nodes that are to soften by one law.

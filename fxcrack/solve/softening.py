@@ -5,7 +5,8 @@ With the free jumps condensed out, the softening ones obey a small system
     (S* - B) delta = c - g*,    S* = S_RR - Y^t Y,   Y = L^-1 S_FR,
 
 B the (negative) stiffness of the bonds. Where S* - B is not positive definite the state is
-unstable; the energy is then lowered to the next minimum along the branches of the bonds.
+unstable, or neutral; the bonds then run open, down to the next minimum of the energy along their
+branches.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ import numpy.typing as npt
 
 from fxcrack.solve.cholesky import GrowingCholesky
 from fxcrack.solve.downhill import downhill
-from fxcrack.solve.soft_bond import STIFFEST, SoftBond
+from fxcrack.solve.soft_bond import NEUTRAL, STIFFEST, SoftBond
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -111,8 +112,12 @@ class SoftSet:
         """Y, shape (n_free, r)."""
         return self._forward
 
-    def _laws(self) -> tuple[Array, Array]:
-        """Forces at zero opening c, shape (r,), and bond stiffness B, shape (r, r)."""
+    def _laws(self, faster: float = 0.0) -> tuple[Array, Array]:
+        """Forces at zero opening c, shape (r,), and bond stiffness B, shape (r, r).
+
+        Args:
+            faster: Fraction by which bonds soften faster than they do.
+        """
         r = len(self.components)
         constant, stiffness = np.zeros(r), np.zeros((r, r))
         i = 0
@@ -121,7 +126,7 @@ class SoftSet:
             dyad = np.outer(bond.direction, bond.direction)
             if bond.largest is None:
                 constant[i:j] = -bond.strength * bond.direction
-                stiffness[i:j, i:j] = bond.strength / bond.final * dyad
+                stiffness[i:j, i:j] = (1.0 + faster) * bond.strength / bond.final * dyad
             else:
                 constant[i:j] = -bond.force(0.0) * bond.direction
                 stiffness[i:j, i:j] = -bond.secant * dyad
@@ -145,8 +150,8 @@ class SoftSet:
         return np.asarray(constant + stiffness @ jump)
 
     def stable(self) -> bool:
-        """Whether S* - B is positive definite."""
-        _, stiffness = self._laws()
+        """Whether S* - B is positive definite, and not just so."""
+        _, stiffness = self._laws(NEUTRAL)
         try:
             np.linalg.cholesky(self.star - stiffness)
         except np.linalg.LinAlgError:

@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from fxcrack import log
 from fxcrack.criteria import (
+    VCCT,
     AmplitudeRelease,
     CrackLengthVsTime,
     CrackOpening,
@@ -105,6 +107,21 @@ def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
             )
 
 
+def _warn_of_neutral_onset(criterion: VCCT, title: str) -> None:
+    """Say what softening from an onset by exact crack closure does.
+
+    There the energy of letting the node go is the one it is to spend: its bond softens as fast as
+    the bodies give way.
+    """
+    if criterion.method == "closure" and not isinstance(criterion, EnhancedVCCT):
+        log.warn(
+            "interface '%s': a bond whose onset is found by method='closure' is neutral there and "
+            "runs open at once, as with Step, though its release is to follow the opening; wide "
+            "fronts carry a third too much so. Take method='vcct', or release by Step",
+            title,
+        )
+
+
 def softens(debond: Debond) -> bool:
     """Whether bond forces fall with their opening."""
     return debond.release.driver == "opening" or isinstance(debond.criterion, EnhancedVCCT)
@@ -135,6 +152,8 @@ class Growth:
         )
         self.front = model.fronts[p]
         self.extent = CrackExtent(self.front)
+        if isinstance(debond.criterion, VCCT) and softens(debond):
+            _warn_of_neutral_onset(debond.criterion, self.title)
         self.evaluator: Evaluator = make_evaluator(
             model, p, debond.criterion, debond.temperature, softens=softens(debond)
         )
