@@ -48,6 +48,16 @@ def _bond(start: float, *, contact: bool = False) -> Interface:
     )
 
 
+def _pins() -> list[Displacement]:
+    """Both arms of a DCB pulled apart by the pins at their ends."""
+    return [Displacement("pin_top", x=0.0, y=1.0), Displacement("pin_bottom", x=0.0, y=-1.0)]
+
+
+def _rollers() -> list[Displacement]:
+    """A beam on two supports, one of which holds it along."""
+    return [Displacement("support_left", y=0.0), Displacement("support_right", x=0.0, y=0.0)]
+
+
 def _elements(height: float, size: float) -> int:
     """Elements over a height, about as high as long."""
     return max(1, round(height / size))
@@ -76,10 +86,7 @@ def dcb(setting: Setting) -> Case:
         mesh,
         materials=ARMS,
         model=PlaneStrain(thickness=BEAM.b),
-        supports=[
-            Displacement("pin_top", x=0.0, y=1.0),
-            Displacement("pin_bottom", x=0.0, y=-1.0),
-        ],
+        supports=_pins(),
         debonds=[Debond(bond, VCCT(GIc=G_IC, **setting.rate_options()))],
         options=setting.options(),
     )
@@ -136,11 +143,7 @@ def enf(setting: Setting) -> Case:
         mesh,
         materials=ARMS,
         model=PlaneStress(thickness=BEAM.b),
-        supports=[
-            Displacement("support_left", y=0.0),
-            Displacement("support_right", x=0.0, y=0.0),
-            Displacement("load", y=-1.0),
-        ],
+        supports=[*_rollers(), Displacement("load", y=-1.0)],
         debonds=[Debond(bond, VCCT(GIc=G_IIC, **setting.rate_options()))],
         options=setting.options(),
     )
@@ -186,10 +189,7 @@ def mmb(setting: Setting) -> Case:
         mesh,
         materials=ARMS,
         model=PlaneStress(thickness=BEAM.b),
-        supports=[
-            Displacement("support_left", y=0.0),
-            Displacement("support_right", x=0.0, y=0.0),
-        ],
+        supports=_rollers(),
         loads=[
             PointForce("lever_end", (0.0, lever / HALF_SPAN)),
             PointForce("load", (0.0, -(lever + HALF_SPAN) / HALF_SPAN)),
@@ -309,10 +309,7 @@ def fatigue_dcb(setting: Setting) -> Case:
         mesh,
         materials=ARMS,
         model=PlaneStrain(thickness=BEAM.b),
-        supports=[
-            Displacement("pin_top", x=0.0, y=1.0),
-            Displacement("pin_bottom", x=0.0, y=-1.0),
-        ],
+        supports=_pins(),
         debonds=[Debond(bond, Fatigue(GIc=G_IC, paris=PARIS, **setting.rate_options()))],
         options=setting.options(),
     )

@@ -52,55 +52,14 @@ def total(rates: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True)
-class BK:
-    """Law of Benzeggagh and Kenane (1996); modes II and III share one toughness.
-
-    Attributes:
-        eta: Exponent, positive.
-    """
+class _ShearExponent:
+    """What the laws have in common that blend toughnesses by the share of shear, B^eta."""
 
     eta: float
 
     def __post_init__(self) -> None:
         """Check the exponent."""
-        positive("BK", eta=self.eta)
-
-    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
-        """Critical total rate at the present mode mix; G_Ic where all rates are zero.
-
-        Args:
-            rates: Energy release rates by mode, shape (n, 3) [force/length].
-            toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) or (3,) [force/length].
-
-        Returns:
-            Critical rates, shape (n,) [force/length].
-        """
-        shear, _ = _shares(rates)
-        g1, g2, _ = _by_mode(toughness)
-        return _blend(g1, g2, shear**self.eta)
-
-    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
-        """Value f = G_T/G_c of the criterion; arguments as for :meth:`critical`.
-
-        Returns:
-            Values, shape (n,); 0 where all rates are zero.
-        """
-        return total(rates) / self.critical(rates, toughness)
-
-
-@dataclass(frozen=True)
-class Reeder:
-    """Law of Reeder et al. (2002): BK with a mode III toughness of its own.
-
-    Attributes:
-        eta: Exponent, positive.
-    """
-
-    eta: float
-
-    def __post_init__(self) -> None:
-        """Check the exponent."""
-        positive("Reeder", eta=self.eta)
+        positive(type(self).__name__, eta=self.eta)
 
     def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Critical total rate at the present mode mix; G_Ic where all rates are zero.
@@ -114,7 +73,7 @@ class Reeder:
         """
         shear, tear = _shares(rates)
         g1, g2, g3 = _by_mode(toughness)
-        return _blend(g1, _blend(g2, g3, tear), shear**self.eta)
+        return _blend(g1, self._in_shear(g2, g3, tear), shear**self.eta)
 
     def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Value f = G_T/G_c of the criterion; arguments as for :meth:`critical`.
@@ -123,6 +82,34 @@ class Reeder:
             Values, shape (n,); 0 where all rates are zero.
         """
         return total(rates) / self.critical(rates, toughness)
+
+    def _in_shear(self, g2: Array, g3: Array, tear: Array) -> Array:
+        """Toughness in pure shear of which mode III has a share, shape (n,)."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class BK(_ShearExponent):
+    """Law of Benzeggagh and Kenane (1996); modes II and III share one toughness.
+
+    Attributes:
+        eta: Exponent, positive.
+    """
+
+    def _in_shear(self, g2: Array, g3: Array, tear: Array) -> Array:
+        return g2
+
+
+@dataclass(frozen=True)
+class Reeder(_ShearExponent):
+    """Law of Reeder et al. (2002): BK with a mode III toughness of its own.
+
+    Attributes:
+        eta: Exponent, positive.
+    """
+
+    def _in_shear(self, g2: Array, g3: Array, tear: Array) -> Array:
+        return _blend(g2, g3, tear)
 
 
 @dataclass(frozen=True)
