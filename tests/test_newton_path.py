@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from specimens import PINS, STEEL, assert_same, bond, dcb, grow_to, largest_imbalance, onsets
+from specimens import (
+    PINS,
+    STEEL,
+    assert_same,
+    bond,
+    dcb,
+    grow_to,
+    largest_imbalance,
+    onsets,
+    specimen,
+)
 
 import fxcrack as fx
 from fxcrack.effects import FiniteStrain
@@ -111,3 +121,36 @@ def test_a_load_beyond_reach_ends_the_step_with_the_reason(comm: MPI.Intracomm) 
         scene.model.move(  # type: ignore[attr-defined]
             scene.loads_at(150.0), np.zeros(scene.model.system.n_window), 150.0, 1.0
         )
+
+
+@pytest.mark.parametrize("finite", [False, True])
+@pytest.mark.parametrize("first", [1.0, -1.0])
+def test_unloading_to_nothing_and_loading_the_other_way(finite: bool, first: float) -> None:
+    """The arms open, rest without load and are pressed together, or the other way round."""
+
+    def run(*pins: float) -> fx.History:
+        amplitude = fx.Amplitude(tuple(float(i) for i in range(len(pins))), pins)
+        scene = specimen(
+            dcb_2d(MPI.COMM_SELF, dx=2.0, ny=2),
+            criterion=fx.VCCT(GIc=1e3),
+            supports=[
+                fx.Displacement("far_upper", x=0.0, y=0.0),
+                fx.Displacement("far_lower", x=0.0, y=0.0),
+                fx.Displacement("pin_top", y=1.0, amplitude=amplitude, name="top"),
+                fx.Displacement("pin_bottom", y=-1.0, amplitude=amplitude, name="bottom"),
+            ],
+            contact=True,
+            effects=[FiniteStrain()] if finite else [],
+            path="newton",
+        )
+        step = fx.Static(until=fx.Time(len(pins) - 1.0), stepping="increment", maximum=0.5)
+        return scene.run(step)
+
+    size = {1.0: 0.5, -1.0: -0.01}
+    there, back = size[first], size[-first]
+    history, straight = run(0.0, there, 0.0, 0.0, back), run(0.0, back)
+    assert history.reason == "time 4 reached"
+    force, time = history["R[top.y]"], history["time"]
+    # the iteration ends at 1e-10 of the forces in the bodies, which are larger than that of a pin
+    assert np.abs(force[(time >= 2.0) & (time <= 3.0)]).max() < 1e-8 * np.abs(force).max()
+    assert force[-1] == pytest.approx(straight["R[top.y]"][-1], rel=1e-6)

@@ -44,7 +44,9 @@ class NewtonOptions:
     """Controls of the nonlinear iteration.
 
     Args:
-        tolerance: Residual over the forces in the bodies at which the iteration ends.
+        tolerance: Residual over the forces in the bodies at which the iteration ends; these are
+            the larger ones of those at the increment's start and those at the iterate, at least
+            round-off of the largest so far.
         max_iterations: Iterations allowed in one solve.
     """
 
@@ -93,6 +95,9 @@ class InterfaceProblem:
         self.values = np.zeros(0)
         """T^t r on the last rows at the last residual evaluated, shape (n_last,)."""
         self.scale = 0.0
+        nothing = np.finfo(float).eps * model.largest_force
+        self.start = max(model.force_scale, nothing), model.round_off
+        """Forces in the bodies at the start, and what rounding leaves of them when they vanish."""
         self.error: Exception | None = None
         """What a callback raised; PETSc passes on an error code only."""
         self._last: tuple[PETSc.Vec, PETSc.Vec, Array, Array] | None = None
@@ -163,7 +168,10 @@ class InterfaceProblem:
         if not np.isfinite(norm):
             return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
         self.model.counts.residuals.append(norm)
-        level = max(self.model.newton.tolerance * self.scale, self.model.round_off)
+        forces, round_off = self.start
+        level = max(
+            self.model.newton.tolerance * max(self.scale, forces), self.model.round_off, round_off
+        )
         if norm <= level and self.fraction == 1.0:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
         if its >= self.model.newton.max_iterations:

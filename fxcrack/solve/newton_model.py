@@ -88,6 +88,7 @@ class NewtonModel(CondensedModel):
         u: Accepted displacement, owned dofs.
         counts: Solves and iterations so far.
         force_scale: Norm of the internal forces at the last residual.
+        largest_force: The largest one of an accepted state.
         round_off: Residual that rounding alone may leave there.
         at: Time of the accepted state.
         pairing_energy: Energy that new pairings of faces that slide have taken so far.
@@ -117,7 +118,7 @@ class NewtonModel(CondensedModel):
         self.newton = newton
         self.counts = Counts()
         self.comm = continuum.comm
-        self.force_scale = self.round_off = 0.0
+        self.force_scale = self.largest_force = self.round_off = 0.0
         self.at = 0.0
         self.u = PETSc.Vec().createMPI((continuum.n_local, continuum.n_global), comm=self.comm)
         self.coordinates: JumpCoordinates
@@ -139,6 +140,7 @@ class NewtonModel(CondensedModel):
         self._trial: PETSc.Vec | None = None
         self.last_move: Move | None = None
         self.pairing_energy = 0.0
+        self._replaced: PETSc.Vec | None = None  # forces of interfaces before a new pairing
 
     # -- the window and its tangent ------------------------------------------------------
 
@@ -273,13 +275,14 @@ class NewtonModel(CondensedModel):
         self.coordinates.transform.mult(y, u)
         u.axpy(1.0, self.u)
         self.bodies.set(u)
-        self.round_off = 4.0 * np.finfo(float).eps * self._stiff * float(u.norm())
         u.destroy()
         return self._out_of_balance(loads)
 
     def _out_of_balance(self, loads: Array) -> PETSc.Vec:
         residual = self.bodies.residual()
         self.force_scale = float(residual.norm())
+        size = float(self.bodies.u.x.petsc_vec.norm())
+        self.round_off = 4.0 * np.finfo(float).eps * self._stiff * size
         factors = loads[self.n_loads - len(self.loads) :]
         for factor, border in zip(factors, self._borders, strict=False):
             residual.axpy(float(factor), border)
@@ -438,11 +441,17 @@ class NewtonModel(CondensedModel):
     def accept(self) -> None:
         """The last trial becomes the accepted state; collective."""
         assert self._trial is not None and self.last_move is not None
+        step = self.u.copy()
+        step.aypx(-1.0, self._trial)
         self._trial.copy(self.u)
         self.at = self._trial_at
+        self.largest_force = max(self.largest_force, self.force_scale)
         self._moved = False
         self.state = self.last_move.end
         self._base = self.state.jump.copy()
+        if self._replaced is not None:
+            self._count_pairing(step)
+        step.destroy()
         if self._begun:
             self.bodies.commit()
 
@@ -514,24 +523,37 @@ class NewtonModel(CondensedModel):
 
         Contact forces move to the master points of the new pairing, and gaps that are not zero in
         it close. The work of the interfaces on the way, by the trapezoidal rule, less what friction
-        and bonds take, is :attr:`pairing_energy`.
+        and bonds take, is :attr:`pairing_energy`. With inertia all that happens in the next
+        increment.
 
         Returns:
             External work.
         """
-        here, before = self.state, self.nodal_forces(self.u)
-        step = self.u.copy()
+        self._replaced = self.nodal_forces(self.u)
+        if self.bodies.dynamic:
+            return 0.0
+        here = self.state
         self.solve(force)
-        work, released, _ = self.along(here, self.state)
         self.rub(here, self.state)
+        return self.along(here, self.state)[0]
+
+    def _count_pairing(self, step: PETSc.Vec) -> None:
+        """Energy of the change of pairing in a move by a step, once it is accepted."""
+        move = self.last_move
+        assert move is not None and self._replaced is not None
         after = self.nodal_forces(self.u)
-        before.axpy(1.0, after)
-        step.aypx(-1.0, self.u)
-        assert self.last_move is not None
-        self.pairing_energy -= 0.5 * float(before.dot(step)) + released + self.last_move.friction
-        for vector in (before, step, after):
-            vector.destroy()
-        return work
+        after.axpy(1.0, self._replaced)
+        n = self.n_loads - len(self.loads)
+        supports = move.conjugate[:n] @ (move.end.loads - move.start.loads)[:n]
+        given = 0.5 * float(after.dot(step)) - float(supports)
+        self.pairing_energy -= given + move.bonds + move.friction
+        after.destroy()
+        self._forget_replaced()
+
+    def _forget_replaced(self) -> None:
+        if self._replaced is not None:
+            self._replaced.destroy()
+            self._replaced = None
 
     def prepare(self, active: list[bool], reach: list[float]) -> None:
         """Build the window for a step, as for a linear continuum."""
@@ -609,7 +631,9 @@ class NewtonModel(CondensedModel):
             self._soft, self._taken = states.bonds, states.finished
             self._rebase()
             self._renumber(numbers, self.state)
-            self.solve(self.state.force)
+            if not self.bodies.dynamic:
+                self.solve(self.state.force)
+        self._forget_replaced()
         self.pairing_energy = energy
 
     def _back(self) -> None:
