@@ -1,0 +1,295 @@
+"""Nonlinear bodies condensed at a displacement: the tangent, its window, what SNES asks of them.
+
+    S = (K_22 - K_21 K_11^-1 K_12)(u),    offset such that S x + offset are the forces at u
+
+Bodies without their past: moves between equilibria are :mod:`fxcrack.solve.newton_model`'s.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fxcrack.errors import InputError
+from fxcrack.interface.jumps import JumpCoordinates
+from fxcrack.interface.replica import JumpReader
+from fxcrack.interface.sliding import renewed
+from fxcrack.interface.surface import gather_surface
+from fxcrack.solve.borders import border_vectors
+from fxcrack.solve.condensation import Condensation
+from fxcrack.solve.condensed import CondensedModel
+from fxcrack.solve.jump_system import Equilibrium, JumpSystem
+from fxcrack.solve.newton import Counts, NewtonOptions
+from fxcrack.solve.rigid import check_held
+from fxcrack.terms.bodies import Bodies
+
+Array = npt.NDArray[np.float64]
+
+_FEW_COLUMNS = 256
+"""Up to so many last coordinates block solves beat a second factorisation on several ranks."""
+
+
+class TangentModel(CondensedModel):
+    """Nonlinear bodies with the dense system of their tangent.
+
+    Args:
+        parts: Those of :class:`~fxcrack.solve.condensed.CondensedModel`, in its order.
+        bodies: The form terms.
+        newton: Controls of the iteration.
+
+    Raises:
+        InputError: The options ask for a way to condense that only linear bodies allow.
+
+    Attributes:
+        u: Accepted displacement, owned dofs.
+        counts: Solves and iterations so far.
+        force_scale: Norm of the internal forces at the last residual.
+        largest_force: The largest one of an accepted state.
+        round_off: Residual that rounding alone may leave there.
+        pairing_energy: Energy that new pairings of faces that slide have taken so far.
+    """
+
+    linear = False
+
+    def __init__(self, *parts: Any, bodies: Bodies, newton: NewtonOptions) -> None:
+        super().__init__(*parts)
+        if self.columns is not None:
+            raise InputError(
+                "method='iterative' keeps its columns while the crack grows, which needs linear "
+                "bodies; use method='auto' with nonlinear ones"
+            )
+        continuum = self.continuum
+        self.bodies = bodies
+        self.newton = newton
+        self.counts = Counts()
+        self.comm = continuum.comm
+        self.force_scale = self.largest_force = self.round_off = 0.0
+        self.u = PETSc.Vec().createMPI((continuum.n_local, continuum.n_global), comm=self.comm)
+        self.coordinates: JumpCoordinates
+        self._stiff = 0.0
+        self._base = np.zeros(0)
+        self._moved = False  # whether the tangent is that of a trial
+        self._version: tuple[int, ...] = ()  # of the terms whose tangent is factored
+        self._current = bodies.finite
+        self._masters = [
+            gather_surface(continuum, p.interface.master)
+            if self._current and p.interface.contact
+            else None
+            for p in self.pairs
+        ]
+        self._undeformed = [p.surface.x for p in self.pairs]
+        self._reader = JumpReader(
+            continuum, self.pairs, [m for m in self._masters if m is not None]
+        )
+        self.pairing_energy = 0.0
+
+    # -- the window and its tangent ------------------------------------------------------
+
+    def _assemble(self) -> None:
+        if self._stiffness is not None:
+            return
+        start = time.perf_counter()
+        check_held(self.continuum, self.supports)
+        self.bodies.compile()
+        self.timings.add("compile", start)
+        start = time.perf_counter()
+        self.bodies.set(self.u)
+        self._stiffness = self.bodies.tangent()
+        self._borders = border_vectors(self.continuum, self.loads, self.monitors)
+        self.timings.add("assemble", start)
+
+    def _condense(self, coordinates: JumpCoordinates) -> None:
+        self.coordinates = coordinates
+        self._base = self._jumps_from(self.u)
+        n_window, n_loads = coordinates.n_window, self.n_loads
+        loads = self.state.loads if hasattr(self, "state") else np.zeros(n_loads)
+        self.bodies.set(self.u)
+        self._factor()
+        self.system = JumpSystem(
+            self.condensation.schur,
+            n_window,
+            n_loads,
+            len(self.loads),
+            offset=np.zeros(coordinates.n_last),
+        )
+        residual = self._out_of_balance(loads)
+        self._anchor(residual, self._base, loads)
+        residual.destroy()
+        self.face_loads = -self.condensation.borders_on_window[:, : len(self.loads)]
+
+    @property
+    def condensation(self) -> Condensation:
+        """The condensed tangent."""
+        assert isinstance(self._condensation, Condensation)
+        return self._condensation
+
+    def _factor(self) -> None:
+        """Condense the tangent at the bodies' present displacement; collective."""
+        if self._condensation is not None:
+            self._condensation.destroy(keep_transform=True)
+            self._condensation = None
+        method = self.options.method
+        if method == "auto" and self.comm.size > 1 and self.coordinates.n_last <= _FEW_COLUMNS:
+            method = "columns"
+        matrix = self._stiffness = self.bodies.tangent()
+        if not self.bodies.symmetric:
+            # the interface algebra stands on a symmetric S: its part of the tangent converges too
+            matrix = matrix.copy()
+            transposed = matrix.transpose(PETSc.Mat())
+            matrix.axpy(1.0, transposed)
+            matrix.scale(0.5)
+            transposed.destroy()
+        self._condensation = Condensation(
+            matrix, self.coordinates, self._borders, self.timings, method=method, definite=False
+        )
+        if matrix is not self._stiffness:
+            matrix.destroy()
+        self._version = self.bodies.version
+        self._stiff = float(self._stiffness.norm(PETSc.NormType.NORM_INFINITY))
+
+    def _anchor(self, residual: PETSc.Vec, jump: Array, loads: Array) -> PETSc.Vec:
+        """Offset of the dense system from a residual; returns A_11^-1 r_1."""
+        values, q = self.condensation.reduced(residual)
+        values[self.system.n_window + len(self.supports.columns) :] += self._border_values()
+        x = np.concatenate([jump, loads])
+        schur = self.condensation.schur
+        self.system.renew(schur, values - schur[:, : len(x)] @ x)
+        return q
+
+    def _border_values(self) -> Array:
+        """Minus the work of each force pattern, then the monitors, at the bodies' displacement."""
+        u = self.bodies.u.x.petsc_vec
+        return np.array([float(border.dot(u)) for border in self._borders])
+
+    def _jumps_from(self, u: PETSc.Vec) -> Array:
+        """Jumps of the window in a displacement, shape (n_window,); collective."""
+        values = self._reader.values.gather(u.array_r)
+        out = np.zeros(self.coordinates.n_window)
+        for pair, frames, index in zip(self.pairs, self.frames, self.index, strict=True):
+            inside = index >= 0
+            out[index[inside]] = self._reader.jumps(values, pair, frames)[inside]
+        return out
+
+    def _follow_fronts(self, u: PETSc.Vec) -> None:
+        """Take normals and lengths at the fronts from a displacement, if it is finite."""
+        if not self._current:
+            return
+        values = self._reader.values.gather(u.array_r)
+        for pair, front, x in zip(self.pairs, self.fronts, self._undeformed, strict=True):
+            moved = x.copy()
+            moved[:, : self.continuum.gdim] += self._reader.slaves(values, pair)
+            front.follow(moved)
+
+    def renew_pairs(self) -> bool:
+        """Pair open nodes with the master surface where it is now; collective.
+
+        Returns:
+            Whether a pair has changed; the dense system is then another one, and the caller
+            solves for its state (:meth:`solve`).
+        """
+        if not any(m is not None for m in self._masters):
+            return False
+        values = self._reader.values.gather(self.u.array_r)
+        changed = False
+        for p, master in enumerate(self._masters):
+            if master is None:
+                continue
+            pair = self.pairs[p]
+            new = renewed(
+                pair,
+                self.fronts[p].bonded,
+                master,
+                self._reader.slaves(values, pair),
+                values[self._reader.values.find(master.dofs)],
+            )
+            if new is not None:
+                self.pairs[p], changed = new, True
+        if changed:
+            self.rebase()
+        return changed
+
+    # -- what SNES asks ------------------------------------------------------------------
+
+    def forces_at(self, y: PETSc.Vec, loads: Array) -> PETSc.Vec:
+        """R(u) minus dead loads at u = u_accepted + T y; the caller destroys it."""
+        u = self.coordinates.transform.createVecLeft()
+        self.coordinates.transform.mult(y, u)
+        u.axpy(1.0, self.u)
+        self.bodies.set(u)
+        u.destroy()
+        return self._out_of_balance(loads)
+
+    def _out_of_balance(self, loads: Array) -> PETSc.Vec:
+        residual = self.bodies.residual()
+        self.force_scale = float(residual.norm())
+        size = float(self.bodies.u.x.petsc_vec.norm())
+        self.round_off = 4.0 * np.finfo(float).eps * self._stiff * size
+        factors = loads[self.n_loads - len(self.loads) :]
+        for factor, border in zip(factors, self._borders, strict=False):
+            residual.axpy(float(factor), border)
+        return residual
+
+    def jumps_of(self, y: PETSc.Vec) -> Array:
+        """Jumps of the window at a trial y, shape (n_window,)."""
+        out = self._base.copy()
+        if self.comm.rank == 0:
+            n = self.coordinates.n_inner
+            out += y.array_r[n : n + len(out)]
+        self.comm.Bcast(out)
+        return out
+
+    def linearise(self, jump: Array, loads: Array, residual: PETSc.Vec, out: PETSc.Vec) -> None:
+        """Dense system of the tangent at the bodies' present displacement.
+
+        ``out`` becomes A_11^-1 r_1.
+        """
+        if not self.bodies.constant or self._version != self.bodies.version:
+            self._factor()
+            self._moved = True
+        q = self._anchor(residual, jump, loads)
+        q.copy(out)
+        q.destroy()
+
+    def interface_equilibrium(self, loads: Array, force: Array) -> Equilibrium:
+        """Jumps and forces on the present tangent, softening bonds on their right branches."""
+        system = self.system
+        state = system.equilibrium(loads, force)
+        for _ in range(4 * len(system.soft.bonds) + 4 if system.soft.bonds else 0):
+            if not system.soft.stable():
+                state = system.pass_unstable(state)
+                continue
+            at, leaving = system.soft.first_event(self.state.jump, state.jump)
+            if not np.isfinite(at):
+                break
+            system.finish([b for b in leaving if system.soft.switch(b, state.jump)])
+            state = system.equilibrium(loads, force)
+        return state
+
+    # -- energies and fields -------------------------------------------------------------
+
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies in the accepted state, by name; collective."""
+        return self.bodies.stored()
+
+    def spent(self) -> dict[str, float]:
+        """Energies the bodies have turned into something else, by name; collective."""
+        spent = self.bodies.spent()
+        if any(m is not None for m in self._masters):
+            spent["pairing_energy"] = self.pairing_energy
+        return spent
+
+    def extra_work(self, state: Equilibrium) -> float:
+        """Work of loads that follow the bodies and of a temperature; collective."""
+        return sum(term.work() for term in self.bodies.terms)
+
+    def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Accepted displacement; the caller destroys it."""
+        return self.u.copy()
+
+    def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Forces of interfaces and supports on the bodies; the caller destroys them."""
+        return self._out_of_balance(self.state.loads if state is None else state.loads)
