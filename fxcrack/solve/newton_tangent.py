@@ -226,8 +226,9 @@ class TangentModel(CondensedModel):
     def _out_of_balance(self, loads: Array) -> PETSc.Vec:
         residual = self.bodies.residual()
         self.force_scale = float(residual.norm())
-        size = float(self.bodies.u.x.petsc_vec.norm())
-        self.round_off = 4.0 * np.finfo(float).eps * self._stiff * size
+        u = self.bodies.u.x.array[: self.continuum.n_local]  # PETSc's norm of it would be cached
+        size = np.sqrt(self.comm.allreduce(float(u @ u)))
+        self.round_off = 4.0 * np.finfo(float).eps * self._stiff * float(size)
         factors = loads[self.n_loads - len(self.loads) :]
         for factor, border in zip(factors, self._borders, strict=False):
             residual.axpy(float(factor), border)
