@@ -99,6 +99,13 @@ class Continuum:
             from fxcrack.thermal import TemperatureField
 
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
+        listed = materials.values() if isinstance(materials, Mapping) else [materials]
+        for material in listed:
+            if isinstance(material, type) or not hasattr(material, "stiffness"):
+                raise InputError(
+                    f"materials: {material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
+                    "nu=0.3), or one per cell group, {'name': Isotropic(...)}"
+                )
         self.part_materials: list[Material] = []
         self.part_cells: list[Ints] = []
         self.parts = self._assign(materials)
@@ -226,14 +233,17 @@ class Continuum:
         function.interpolate(value)
         return function
 
+    def _check_components(self, value: tuple[Field, ...], title: str) -> None:
+        given = len(value) if hasattr(value, "__len__") else "no list of"
+        if given != self.gdim:
+            raise InputError(f"load '{title}': {given} components given, {self.gdim} needed")
+
     def _vector(self, value: tuple[Field, ...], title: str) -> Any:
-        if len(value) != self.gdim:
-            raise InputError(f"load '{title}': {len(value)} components given, {self.gdim} needed")
+        self._check_components(value, title)
         return ufl.as_vector([self.field(v) for v in value])
 
     def _point_force(self, where: str, value: tuple[float, ...], title: str) -> PETSc.Vec:
-        if len(value) != self.gdim:
-            raise InputError(f"load '{title}': {len(value)} components given, {self.gdim} needed")
+        self._check_components(value, title)
         nodes = self.owned_nodes(where)
         count = self.comm.allreduce(len(nodes))
         vector = PETSc.Vec().createMPI((self.n_local, self.n_global), comm=self.comm)

@@ -11,10 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from fxcrack import log
 from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface
 from fxcrack.loads import Load, Pressure
+from fxcrack.temperature import expansion_of
 
 if TYPE_CHECKING:
     from fxcrack.terms import Term
@@ -113,6 +115,13 @@ def plan(
     if continuum.temperature is not None:
         from fxcrack import thermal
 
+        if not any(
+            hasattr(m, "temperatures") or expansion_of(m).any() for m in continuum.part_materials
+        ):
+            log.warn(
+                "Temperature: no material expands, so it strains nothing; give the materials an "
+                "expansion, unless only the interface depends on temperature"
+            )
         on.append("temperature: thermal strain and what is tabulated against temperature")
         if not thermal.is_linear(continuum):
             why.append("moduli change as the temperature does")

@@ -5,6 +5,8 @@ Every message says what is wrong, where, and how to mend it.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from difflib import get_close_matches
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -56,4 +58,13 @@ def agree(comm: MPI.Comm, problem: str | None, error: type[FxcrackError] = Input
 
 def unknown_name(kind: str, name: str, known: list[str]) -> NoReturn:
     """Raise an :class:`InputError` that lists the names that would have worked."""
-    raise InputError(f"there is no {kind} '{name}'; known: {', '.join(sorted(known)) or 'none'}")
+    meant = did_you_mean(name, known)
+    raise InputError(
+        f"there is no {kind} '{name}'{meant}; known: {', '.join(sorted(known)) or 'none'}"
+    )
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """Words that propose the known name closest to a misspelt one, empty if none is close."""
+    close = get_close_matches(name, list(known), n=1, cutoff=0.75)
+    return f" (did you mean '{close[0]}'?)" if close else ""

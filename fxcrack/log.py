@@ -7,7 +7,6 @@ import logging
 from mpi4py import MPI
 
 logger = logging.getLogger("fxcrack")
-logger.addHandler(logging.NullHandler())
 
 
 def info(message: str, *args: object) -> None:

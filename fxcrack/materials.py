@@ -43,6 +43,7 @@ class Isotropic:
     def __post_init__(self) -> None:
         """Check the constants."""
         name = type(self).__name__
+        _check_numbers(name, E=self.E, nu=self.nu)
         if not (np.isfinite(self.E) and self.E > 0.0):
             raise InputError(f"{name}: E = {self.E} must be positive")
         if not -1.0 < self.nu < 0.5:
@@ -140,6 +141,12 @@ class Orthotropic:
         e3 = np.cross(e1, in_plane)
         e3 /= np.linalg.norm(e3)
         return strain_rotation(np.vstack([e1, np.cross(e3, e1), e3]))
+
+
+def _check_numbers(name: str, **values: object) -> None:
+    for field, value in values.items():
+        if isinstance(value, str) or not np.isscalar(value):
+            raise InputError(f"{name}: {field} = {value!r} is not a number; give one")
 
 
 def _check_common(name: str, expansion: float | tuple[float, ...], density: float | None) -> None:

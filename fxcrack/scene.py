@@ -11,15 +11,24 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.accuracy.estimate import as_details, check_accuracy, demand
+from fxcrack.arguments import check_amplitudes, one, several
 from fxcrack.continuum import Continuum
 from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.errors import InputError
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
-from fxcrack.loads import Displacement, Load, Monitor
+from fxcrack.loads import (
+    BodyForce,
+    Displacement,
+    Load,
+    Monitor,
+    PointForce,
+    Pressure,
+    Traction,
+)
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
-from fxcrack.models import Model
+from fxcrack.models import Axisymmetric, Model, PlaneStrain, PlaneStress, Solid
 from fxcrack.output.checkpoint import Checkpoint
 from fxcrack.output.explain import Explanation, explain
 from fxcrack.output.history import History, Row
@@ -81,7 +90,19 @@ class Scene:
         newton: NewtonOptions | None = None,
     ) -> None:
         self.parts = {k: v for k, v in locals().items() if k not in ("self", "mesh")}
-        interfaces = [d.interface for d in debonds] + list(bonds)
+        one("Scene", "mesh", mesh, Mesh, "read_mesh('mine.msh')")
+        one("Scene", "model", model, (PlaneStrain, PlaneStress, Axisymmetric, Solid), "Solid()")
+        supports = several("Scene", "supports", supports, Displacement)
+        loads = several("Scene", "loads", loads, (Traction, Pressure, BodyForce, PointForce))
+        check_amplitudes([*supports, *loads])
+        debonds = several("Scene", "debonds", debonds, Debond)
+        bonds = several("Scene", "bonds", bonds, Interface)
+        monitors = several("Scene", "monitors", monitors, Monitor)
+        if not isinstance(effects, Sequence):
+            raise InputError(
+                f"Scene: effects must be a list, not {type(effects).__name__}; write effects=[...]"
+            )
+        interfaces = [d.interface for d in debonds] + bonds
         titles = [i.title for i in interfaces]
         for title in titles:
             if titles.count(title) > 1:
@@ -90,17 +111,17 @@ class Scene:
                     "different names to different interfaces"
                 )
         self.mesh = mesh
-        self.debonds = list(debonds)
+        self.debonds = debonds
         self.effects = list(effects)
         self.continuum = Continuum(
             mesh, materials, model, order=order, temperature=temperature_of(self.effects)
         )
         self.pairs = [make_pair(self.continuum, i) for i in interfaces]
         check_friction(self.debonds, self.pairs)
-        self.supports = collect_supports(self.continuum, list(supports))
+        self.supports = collect_supports(self.continuum, supports)
         self.plan = plan(self.continuum, self.effects, loads, interfaces, path)
         self.loads = dead_loads(self.continuum, loads, self.plan.path)
-        parts = self.continuum, self.pairs, self.supports, self.loads, list(monitors)
+        parts = self.continuum, self.pairs, self.supports, self.loads, monitors
         self.model: CondensedModel
         if self.plan.path == "condensed":
             self.model = CondensedModel(*parts, options or CondensedOptions())
@@ -179,7 +200,8 @@ class Scene:
         """
         if accuracy is not None:
             check_accuracy(accuracy)
-        chosen = self.debonds if grow is None else list(grow)
+        one("run", "step", step, (Static, Cycles), "Static(until=Time(1.0))")
+        chosen = self.debonds if grow is None else several("run", "grow", grow, Debond)
         for debond in chosen:
             if debond not in self.debonds:
                 raise InputError(

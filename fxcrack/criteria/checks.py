@@ -23,6 +23,8 @@ def number(owner: str, name: str, value: object) -> float:
         InputError: ``value`` is not a number, or NaN.
     """
     try:
+        if isinstance(value, str):
+            raise TypeError
         result = float(value)  # type: ignore[arg-type]
     except (TypeError, ValueError):
         raise InputError(f"{owner}: {name} = {value!r} is not a number; give one") from None

@@ -146,6 +146,15 @@ class VCCT(RateCriterion):
     """Growth when the energy release rate of the virtual crack closure technique reaches toughness.
 
     Attributes:
+        GIc: Mode I toughness [force/length]: a number, one value per slave node, a function of
+            position (n, gdim) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
+        GIIc: Mode II toughness, likewise; GIc when not given.
+        GIIIc: Mode III toughness, likewise; GIIc when not given.
+        mix: :class:`~fxcrack.BK`, :class:`~fxcrack.Power` or :class:`~fxcrack.Reeder`. Needed as
+            soon as GIIc or GIIIc is given. Without them f = G_T/GIc.
+        tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
+        method: "vcct", or "closure": the exact energy of releasing the node.
+        normalisation: Length VCCT divides by, see :func:`energy_release_rates`.
         unstable_tolerance: f_tol of unstable growth: several nodes may go at one load while
             1 + tolerance <= f <= 1 + unstable_tolerance. None: off; math.inf: unlimited.
         viscosity: Viscous regularisation mu of released nodes, also of those that soften [time];

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from fxcrack.errors import MeshError
+from fxcrack.errors import MeshError, did_you_mean
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,16 @@ class Mesh:
     domain: dolfinx.mesh.Mesh
     groups: dict[str, Group]
     name: str = "mesh"
+
+    def __repr__(self) -> str:
+        """Name, dimension, order and groups."""
+        return (
+            f"Mesh '{self.name}', {self.gdim}-D, order {self.order}, groups: "
+            f"{self._listing() or 'none'}"
+        )
+
+    def _listing(self) -> str:
+        return ", ".join(f"{n} (dim {g.dim})" for n, g in sorted(self.groups.items()))
 
     @property
     def comm(self) -> MPI.Intracomm:
@@ -71,8 +81,10 @@ class Mesh:
             MeshError: The name is unknown or its dimension is another one.
         """
         if name not in self.groups:
-            known = ", ".join(f"{n} (dim {g.dim})" for n, g in sorted(self.groups.items()))
-            raise MeshError(f"mesh '{self.name}' has no group '{name}'; it has: {known or 'none'}")
+            raise MeshError(
+                f"mesh '{self.name}' has no group '{name}'{did_you_mean(name, self.groups)}; it "
+                f"has: {self._listing() or 'none'}"
+            )
         found = self.groups[name]
         if dim is not None and found.dim != dim:
             raise MeshError(

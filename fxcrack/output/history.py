@@ -15,7 +15,7 @@ import csv
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -68,12 +68,21 @@ class History:
         """Add a row."""
         self.rows.append(row)
 
-    def __getitem__(self, column: str) -> npt.NDArray[Any]:
-        """A column as an array, NaN where a row lacks it.
+    @overload
+    def __getitem__(self, column: str) -> npt.NDArray[Any]: ...
+
+    @overload
+    def __getitem__(self, column: int) -> Row: ...
+
+    def __getitem__(self, column: str | int) -> npt.NDArray[Any] | Row:
+        """A column as an array, NaN where a row lacks it; by a whole number, that row.
 
         Raises:
             InputError: No row has the column.
+            IndexError: There are fewer rows.
         """
+        if isinstance(column, int):
+            return self.rows[column]
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])

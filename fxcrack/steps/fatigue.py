@@ -18,7 +18,7 @@ from fxcrack.criteria import Fatigue, Step
 from fxcrack.errors import InputError
 from fxcrack.steps.growth import Debond
 from fxcrack.steps.static import Static
-from fxcrack.steps.until import Time, Until
+from fxcrack.steps.until import Time, Until, conditions
 
 Array = npt.NDArray[np.float64]
 Bools = npt.NDArray[np.bool_]
@@ -51,7 +51,7 @@ class Cycles:
         ratio: Loads at the minimum over loads at the maximum, R < 1.
         period: First and last time of a turn through the amplitudes.
         n_max: Number of cycles after which the step ends.
-        until: End condition, or several of which the first met ends the step.
+        until: End condition, or a list of them of which the first met ends the step.
         change: How far G may lie from the parabola between two equilibria, over G_max, where
             contact changes between them.
     """
@@ -61,7 +61,7 @@ class Cycles:
     ratio: float | None = None
     period: tuple[float, float] | None = None
     n_max: float = float("inf")
-    until: Until | tuple[Until, ...] = ()
+    until: Until | Sequence[Until] = ()
     change: float = 5e-3
 
     def __post_init__(self) -> None:
@@ -96,7 +96,7 @@ class Cycles:
     @property
     def ends(self) -> tuple[Until, ...]:
         """End conditions as a tuple."""
-        return self.until if isinstance(self.until, tuple) else (self.until,)
+        return conditions("Cycles", self.until)
 
     def corners(
         self,

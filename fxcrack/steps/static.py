@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from fxcrack.errors import InputError
-from fxcrack.steps.until import Until
+from fxcrack.steps.until import Until, conditions
 
 
 @dataclass(frozen=True)
@@ -13,7 +14,7 @@ class Static:
     """A quasi-static step.
 
     Args:
-        until: End condition, or several of which the first met ends the step.
+        until: End condition, or a list of them of which the first met ends the step.
         stepping: "event" goes from release to release, each at exactly f = 1;
             "increment" takes time increments and accepts 1 <= f <= 1 + tolerance, cutting back
             above; "path" keeps the load factor of a proportional load on the equilibrium path at
@@ -29,7 +30,7 @@ class Static:
             head straight for it, assuming a proportional load; ``None`` does not.
     """
 
-    until: Until | tuple[Until, ...]
+    until: Until | Sequence[Until]
     stepping: str = "event"
     initial: float = 0.1
     minimum: float = 1e-9
@@ -41,7 +42,8 @@ class Static:
     linear_scaling: float | None = None
 
     def __post_init__(self) -> None:
-        """Check the controls."""
+        """Check the end and the controls."""
+        conditions(type(self).__name__, self.until)
         if self.stepping not in ("event", "increment", "path"):
             raise InputError(f"stepping = '{self.stepping}': choose event, increment or path")
         if not 0.0 < self.minimum <= self.initial <= self.maximum:
@@ -61,7 +63,7 @@ class Static:
     @property
     def ends(self) -> tuple[Until, ...]:
         """End conditions as a tuple."""
-        return self.until if isinstance(self.until, tuple) else (self.until,)
+        return conditions(type(self).__name__, self.until)
 
 
 @dataclass(frozen=True)

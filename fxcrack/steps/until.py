@@ -47,3 +47,23 @@ class Releases:
 
 
 Until = Time | CrackLength | Releases
+
+
+def conditions(owner: str, until: object) -> tuple[Until, ...]:
+    """One end condition or several as a tuple.
+
+    Args:
+        owner: Name of the step.
+        until: What its user gave: a condition, or a tuple or list of them.
+
+    Raises:
+        InputError: It holds something that is no end condition.
+    """
+    ends = tuple(until) if isinstance(until, tuple | list) else (until,)
+    for end in ends:
+        if not isinstance(end, Until):
+            raise InputError(
+                f"{owner}: until = {end!r} is no end condition; give Time(t), "
+                "CrackLength(interface, a), Releases(n), or a list of them"
+            )
+    return ends

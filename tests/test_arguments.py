@@ -1,0 +1,91 @@
+"""Slips of the pen are told from each other, and none is taken for something else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import fxcrack as fx
+from fxcrack.meshes.dcb import dcb_2d
+
+BOND = fx.Interface("upper_face", "lower_face", bonded=lambda x: x[0] >= 2.0, name="bond")
+PARTS: dict[str, Any] = {
+    "materials": fx.Isotropic(E=70e3, nu=0.3),
+    "model": fx.PlaneStrain(),
+    "supports": [
+        fx.Displacement("pin_top", x=0.0, y=1.0),
+        fx.Displacement("pin_bottom", x=0.0, y=-1.0),
+    ],
+    "debonds": [fx.Debond(BOND, fx.VCCT(GIc=0.2))],
+}
+
+
+@pytest.fixture(scope="module")
+def mesh() -> fx.Mesh:
+    return dcb_2d(length=6.0, height=1.0, dx=1.0, ny=1)
+
+
+def run(mesh: fx.Mesh, step: Any = None, **parts: Any) -> fx.History:
+    return fx.Scene(mesh, **(PARTS | parts)).run(step or fx.Static(until=fx.Releases(1)))
+
+
+def push(**words: Any) -> list[fx.Displacement]:
+    return [fx.Displacement("pin_top", x=0.0, y=1.0, **words), PARTS["supports"][1]]
+
+
+@pytest.mark.parametrize(
+    ("parts", "words"),
+    [
+        ({"model": fx.PlaneStrain}, "PlaneStrain is a class"),
+        ({"materials": {"upper": fx.Isotropic, "lower": PARTS["materials"]}}, "not a material"),
+        ({"supports": PARTS["supports"][0]}, r"write supports=\[...\]"),
+        ({"effects": fx.FiniteStrain()}, r"write effects=\[...\]"),
+        ({"debonds": [BOND]}, r"debonds\[0\] is Interface"),
+        ({"supports": push(amplitude=2.0)}, "give Amplitude"),
+        ({"loads": [fx.PointForce("pin_top", 1.0)]}, "no list of components"),  # type: ignore[arg-type]
+        ({"step": fx.Time(1.0)}, "step is Time"),
+        ({"supports": [fx.Displacement("pin_tap", y=1.0)]}, "did you mean 'pin_top'"),
+    ],
+)
+def test_parts_of_the_wrong_kind(mesh: fx.Mesh, parts: dict[str, Any], words: str) -> None:
+    with pytest.raises(fx.InputError, match=words):
+        run(mesh, **parts)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: fx.Static(until=1.0),  # type: ignore[arg-type]
+        lambda: fx.Cycles(maximum=1.0, ratio=0.1, until=40.0),  # type: ignore[arg-type]
+        lambda: fx.VCCT(GIc="0.2"),  # type: ignore[arg-type]
+        lambda: fx.Isotropic("70e3", 0.3),  # type: ignore[arg-type]
+    ],
+)
+def test_values_of_the_wrong_kind(make: Callable[[], Any]) -> None:
+    with pytest.raises(fx.InputError, match=r"until|not a number"):
+        make()
+
+
+def test_a_list_of_end_conditions_ends_at_the_first(mesh: fx.Mesh) -> None:
+    ends = [fx.Time(1e-3), fx.CrackLength(BOND, 4.0)]
+    history = run(mesh, fx.Static(until=ends), debonds=[fx.Debond(BOND, fx.VCCT(GIc=1e6))])
+    assert history.reason == "time 0.001 reached"
+    assert history[-1]["a[bond]"] < 4.0
+
+
+def test_temperature_that_strains_nothing_is_told(
+    mesh: fx.Mesh, caplog: pytest.LogCaptureFixture
+) -> None:
+    fx.Scene(mesh, **PARTS, effects=[fx.Temperature(10.0)])
+    if mesh.comm.rank == 0:
+        assert "no material expands" in caplog.text
+    caplog.clear()
+    warm = {"materials": fx.Isotropic(70e3, 0.3, expansion=1e-5)}
+    fx.Scene(mesh, **(PARTS | warm), effects=[fx.Temperature(10.0)])
+    assert not caplog.text
+
+
+def test_a_mesh_says_its_groups_not_its_entities(mesh: fx.Mesh) -> None:
+    assert "upper (dim 2)" in repr(mesh) and "array" not in repr(mesh)
