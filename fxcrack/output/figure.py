@@ -69,11 +69,11 @@ def colour_bar(
 
 
 def from_zero(ax: Axes) -> None:
-    """Let axes whose data are nowhere negative begin at zero."""
+    """Let axes begin at zero whose data are nowhere negative, nor all far from it."""
     (x, y), (right, top) = ax.dataLim.min, ax.dataLim.max
-    if x >= -1e-9 * abs(right):
+    if -1e-9 * abs(right) <= x <= 0.5 * right:
         ax.set_xlim(left=0.0)
-    if y >= -1e-9 * abs(top):
+    if -1e-9 * abs(top) <= y <= 0.5 * top:
         ax.set_ylim(bottom=0.0)
 
 
