@@ -58,7 +58,7 @@ def test_ductile_arms_carry_no_more_than_their_plastic_moment():
     history, elastic = plastic_cod.run(1.0), plastic_cod.run(1.0, yield_stress=None)
     found, straight = plastic_cod.onsets(history), plastic_cod.onsets(elastic)
     a, _, load, opening, spent = found.T
-    assert a.tolist() == straight[:, 0].tolist() == list(range(30, 38))
+    assert a == pytest.approx(np.arange(30.0, 38.0)) and straight[:, 0] == pytest.approx(a)
     asked = np.interp(a - plastic_cod.A0, *plastic_cod.RESISTANCE)
     np.testing.assert_allclose(opening, asked, rtol=1e-8)  # an onset is found to 1e-9 of f
     np.testing.assert_allclose(straight[:, 3], asked, rtol=1e-8)
