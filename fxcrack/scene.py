@@ -15,6 +15,7 @@ from fxcrack.arguments import check_amplitudes, one, several
 from fxcrack.continuum import Continuum
 from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.errors import InputError
+from fxcrack.inertia import Inertia
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
 from fxcrack.loads import (
@@ -42,7 +43,7 @@ from fxcrack.steps.growth import Debond, Growth, check_friction
 from fxcrack.steps.keeper import Keeper, keeper_of
 from fxcrack.steps.letting_go import Letting, given_forces
 from fxcrack.steps.march import March, Observer
-from fxcrack.steps.static import Static
+from fxcrack.steps.static import Dynamic, Static
 from fxcrack.steps.until import CrackLength
 
 Array = npt.NDArray[np.float64]
@@ -208,6 +209,11 @@ class Scene:
                     f"debond of interface '{debond.interface.title}' is not part of the scene"
                 )
         check_criteria(step, chosen)
+        if isinstance(step, Dynamic) and not any(isinstance(e, Inertia) for e in self.effects):
+            raise InputError(
+                "Dynamic moves bodies that have inertia, and the scene has none; write "
+                "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
+            )
         active = [d in chosen for d in self.debonds]
         active += [False] * (len(self.pairs) - len(self.debonds))
         if not self._started:

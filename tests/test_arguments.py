@@ -89,3 +89,13 @@ def test_temperature_that_strains_nothing_is_told(
 
 def test_a_mesh_says_its_groups_not_its_entities(mesh: fx.Mesh) -> None:
     assert "upper (dim 2)" in repr(mesh) and "array" not in repr(mesh)
+
+
+def test_a_dynamic_step_needs_inertia(mesh: fx.Mesh) -> None:
+    with pytest.raises(fx.InputError, match=r"effects=\[Inertia\(\)\]"):
+        run(mesh, fx.Dynamic(until=fx.Time(1.0), dt=0.1))
+
+
+def test_a_scene_without_load_says_so(mesh: fx.Mesh) -> None:
+    still = [fx.Displacement("pin_top", x=0.0, y=0.0), fx.Displacement("pin_bottom", x=0.0, y=0.0)]
+    assert "no load acts" in run(mesh, supports=still).reason

@@ -114,7 +114,13 @@ class March(Loading):
             if self._curves_have_ended():
                 return "the curves of crack length against time have ended"
             if not self._load_to_event():
-                return self._ended() or _NEVER
+                return self._ended() or self._never()
+
+    def _never(self) -> str:
+        """Why the load was raised in vain."""
+        if not np.any(self.loads_at(self.time + 1.0)):
+            return "no load acts in this step and no support moves, so the criterion is not reached"
+        return _NEVER
 
     def _run_path(self) -> str:
         if self.breaks:
@@ -136,7 +142,7 @@ class March(Loading):
             if max(self._largest()) > 1.0 + 1e-9:
                 self._unload_to_event()
             elif max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
-                return self._ended() or _NEVER
+                return self._ended() or self._never()
             self._record("onset")
             self._let_go()
 
