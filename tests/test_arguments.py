@@ -59,12 +59,13 @@ def test_parts_of_the_wrong_kind(mesh: fx.Mesh, parts: dict[str, Any], words: st
     [
         lambda: fx.Static(until=1.0),  # type: ignore[arg-type]
         lambda: fx.Cycles(maximum=1.0, ratio=0.1, until=40.0),  # type: ignore[arg-type]
+        lambda: fx.mesh_from_gmsh(None, split=fx.Split("glue", "s", "m", (0.0, 1.0))),  # type: ignore[arg-type]
         lambda: fx.VCCT(GIc="0.2"),  # type: ignore[arg-type]
         lambda: fx.Isotropic("70e3", 0.3),  # type: ignore[arg-type]
     ],
 )
 def test_values_of_the_wrong_kind(make: Callable[[], Any]) -> None:
-    with pytest.raises(fx.InputError, match=r"until|not a number"):
+    with pytest.raises(fx.InputError, match=r"until|not a number|write split="):
         make()
 
 

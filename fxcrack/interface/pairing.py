@@ -64,7 +64,8 @@ class Interface:
         if self.slave == self.master:
             raise InterfaceError(
                 f"interface '{self.slave}' pairs a surface with itself; self-contact is not "
-                "possible here: name two distinct facet groups"
+                "possible here: name two distinct facet groups (a surface inside one conforming "
+                "mesh becomes two by read_mesh(path, split=[Split(...)]))"
             )
         if self.tolerance is not None and not 0.0 < self.tolerance < np.inf:
             raise InterfaceError(
