@@ -27,8 +27,9 @@ class FiniteStrain:
     """Large rotations and strains of the bodies.
 
     Elastic materials follow the St. Venant-Kirchhoff law (their stiffness between the second
-    Piola-Kirchhoff stress and the Green-Lagrange strain). Normals and lengths at crack fronts are
-    those of the deformed bodies, and open faces are paired anew as they slide.
+    Piola-Kirchhoff stress and the Green-Lagrange strain). Normals at crack fronts are those
+    of the deformed bodies, energy release rates are per undeformed area, and open faces are paired
+    anew as they slide.
     """
 
 

@@ -30,7 +30,7 @@ def test_elastica_has_the_known_first_corrections():
 @pytest.mark.mpi
 @pytest.mark.slow
 def test_neo_hookean_large_dcb(comm: MPI.Intracomm):
-    scene, rows = large_dcb.run(dx=1.0, ny=2, until=42.0, law="neo-Hookean", comm=comm)
+    scene, rows = large_dcb.run(dx=0.5, ny=2, until=41.0, law="neo-Hookean", comm=comm)
     assert len(rows) == 2
     for a, opening, load, rate, by_slope in rows:
         exact, exact_rate = large_dcb.at_opening(a, opening)

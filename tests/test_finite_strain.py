@@ -158,3 +158,24 @@ def test_a_block_slides_over_many_facets(comm: MPI.Intracomm) -> None:
     assert 8.0 * right / 10.0 == pytest.approx(stood, abs=0.06)
     # nothing holds the block back but the slope of the bent beam
     assert np.abs(history["R[slide.x]"][loaded]).max() < 0.05
+
+
+def test_rate_of_a_peeled_film_does_not_depend_on_which_face_is_the_slave():
+    # the film's face is stretched by 2 % at the root, the other one not at all
+    def rate(slave: str, master: str) -> float:
+        bond = fx.Interface(slave, master, bonded=lambda x: x[0] >= 8.0 - 1e-9, name="bond")
+        scene = fx.Scene(
+            dcb_2d(length=11.0, height=0.2, dx=0.5, ny=1, order=2),
+            materials=fx.Isotropic(E=1000.0, nu=0.3),
+            model=fx.PlaneStrain(),
+            supports=[fx.Displacement("pin_top", y=1.0), fx.Displacement("bottom", x=0.0, y=0.0)],
+            debonds=[fx.Debond(bond, fx.VCCT(GIc=1.0))],
+            effects=[fx.FiniteStrain()],
+        )
+        scene.run(fx.Static(until=fx.Time(4.5), stepping="increment", initial=1.5))
+        return float(scene.history[-1]["f[bond]"])
+
+    # equal to the tolerance of the equilibrium
+    assert rate("upper_face", "lower_face") == pytest.approx(
+        rate("lower_face", "upper_face"), rel=1e-5
+    )

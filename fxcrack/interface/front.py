@@ -9,6 +9,8 @@ interpolated there. Second-order surfaces use the corner-midside-corner lines of
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import numpy.typing as npt
 
@@ -46,7 +48,7 @@ class Front:
     """
 
     def __init__(self, surface: FacetSurface, bonded: Bools, title: str) -> None:
-        self.surface = surface
+        self.surface = self._undeformed = surface
         self.title = title
         self.bonded = bonded.copy()
         self.version = 0
@@ -131,6 +133,10 @@ class Front:
 
     def follow(self, x: Array) -> None:
         """Take the slave nodes at other positions: the current configuration.
+
+        Frames turn with it. Lengths and areas stay those of the undeformed surface: toughness is
+        energy per undeformed area, as the open area of the history is, and so does not depend on
+        how the face that is the slave has stretched.
 
         Args:
             x: Shape (n_nodes, 3), length.
@@ -220,13 +226,15 @@ class Front:
         """Geometry of one front node."""
         found = self._cache.get(node)
         if found is None:
-            found = self._tip_on_lines(node) if self._by_lines else self._tip(node)
+            find = self._tip_on_lines if self._by_lines else self._tip
+            found = find(node, self._undeformed)
+            if self.surface is not self._undeformed:
+                found = replace(found, frame=find(node, self.surface).frame)
             self._cache[node] = found
         return found
 
-    def _growth(self, node: int) -> Array:
+    def _growth(self, node: int, s: FacetSurface) -> Array:
         """Unit growth direction in the tangent plane."""
-        s = self.surface
         indicator = (~self.bonded).astype(float)
         total = np.zeros(3)
         scale = 0.0
@@ -245,15 +253,14 @@ class Front:
             length = norm(total)
         return np.asarray(total / length)
 
-    def _frame(self, node: int, growth: Array) -> Array:
-        normal = -self.surface.normals[node]
+    def _frame(self, node: int, growth: Array, s: FacetSurface) -> Array:
+        normal = -s.normals[node]
         return np.array([normal, growth, cross(normal, growth)]).T
 
-    def _tip(self, node: int) -> Tip:
-        s = self.surface
-        growth = self._growth(node)
-        d_behind, wake, weights = self._ray(node, -growth, open_side=True)
-        d_ahead, ahead, _ = self._ray(node, growth, open_side=False)
+    def _tip(self, node: int, s: FacetSurface) -> Tip:
+        growth = self._growth(node, s)
+        d_behind, wake, weights = self._ray(node, -growth, s, open_side=True)
+        d_ahead, ahead, _ = self._ray(node, growth, s, open_side=False)
         if s.dim == 1:
             width = float(s.breadth[node])
             across = 0.5 * (width + float(s.breadth[ahead[0]]))
@@ -261,13 +268,14 @@ class Front:
             width = across = float(s.areas[node]) / (0.5 * (d_ahead + d_behind))
         area = across * d_ahead if d_ahead > 0.0 else float(s.areas[node])
         return Tip(
-            node, np.array([node]), wake[None], weights[None], self._frame(node, growth),
+            node, np.array([node]), wake[None], weights[None], self._frame(node, growth, s),
             d_ahead, d_behind, width, area,
         )  # fmt: skip
 
-    def _ray(self, node: int, direction: Array, *, open_side: bool) -> tuple[float, Ints, Array]:
+    def _ray(
+        self, node: int, direction: Array, s: FacetSurface, *, open_side: bool
+    ) -> tuple[float, Ints, Array]:
         """Where a ray leaves the facets around a node: distance, two nodes, their weights."""
-        s = self.surface
         origin = s.x[node]
         best: tuple[float, Ints, Array] | None = None
         if s.dim == 2:
@@ -304,8 +312,7 @@ class Front:
         k = int(np.argmax(cosine))
         return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
 
-    def _tip_on_lines(self, node: int) -> Tip:
-        s = self.surface
+    def _tip_on_lines(self, node: int, s: FacetSurface) -> Tip:
         heading = self._heading[node] if self._heading is not None else np.zeros(3)
         links = self._links[node]
         vectors = s.x[links[:, 0]] - s.x[node]
@@ -336,6 +343,6 @@ class Front:
             width = across = float(s.areas[middle]) / (d_behind * 2.0 / 3.0)
         return Tip(
             node, force_nodes, np.array([[corner, corner], [middle, middle]]),
-            np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth), d_ahead, d_behind,
+            np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth, s), d_ahead, d_behind,
             width, across * d_ahead if d_ahead > 0.0 else 0.5 * width * d_behind,
         )  # fmt: skip
