@@ -79,6 +79,15 @@ class CorrectedBeam:
         ae = a + 0.42 * self.chi * self.h
         return 9.0 * load**2 * ae**2 / (16.0 * self.b**2 * self.E * self.h**3)
 
+    def enf_deflection(self, a: Number, load: Number, half_span: float) -> Number:
+        """Deflection under the load of an end-notched flexure specimen, with that of shear.
+
+        P (2 L^3 + 3 a^3)/(8 E b h^3) + 3 P L/(10 G b h); both parts of the beam shear alike.
+        """
+        ae = a + 0.42 * self.chi * self.h
+        bending = (2.0 * half_span**3 + 3.0 * ae**3) / (8.0 * self.E * self.b * self.h**3)
+        return load * (bending + 0.3 * half_span / (self.G * self.b * self.h))
+
     def mmb_rates(
         self, a: Number, load: Number, lever: float, half_span: float
     ) -> tuple[Number, Number]:

@@ -170,6 +170,11 @@ class Account:
     # -- letting go ----------------------------------------------------------------------
 
     def _let_go(self, *, all_ready: bool = False) -> None:
+        """Release the critical nodes (or all with f >= 1) at the present load, and say so."""
+        self._free(all_ready=all_ready)
+        self._record("release")
+
+    def _free(self, *, all_ready: bool = False) -> None:
         """Release the critical nodes (or all with f >= 1) at the present load."""
         for g, v in zip(self.growths, self._values, strict=True):
             if all_ready:
@@ -182,7 +187,6 @@ class Account:
                 continue
             self._release(g, g.nodes_of(v, ready), v)
         self._look()
-        self._record("release")
 
     def _release(self, g: Growth, nodes: Ints, values: TipValues) -> None:
         """Let nodes of one interface go, at once or with time."""

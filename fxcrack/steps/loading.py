@@ -5,7 +5,7 @@ States, energies and rows of the history are kept by :class:`~fxcrack.steps.acco
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -146,6 +146,26 @@ class Loading(Account):
     def _unload_to_event(self) -> None:
         if not self._walk(0.0, upward=False):
             raise InputError("stepping='path': f stays above 1 down to zero load; check prestress")
+
+    def _unload_until(self, excess: Callable[[Equilibrium], float]) -> bool:
+        """Take load away until a quantity that is linear along pieces has fallen to zero.
+
+        Returns:
+            Whether it did before the load was gone.
+        """
+        begin = self.time
+        for fraction, point in self._along(0.0):
+            here, start = self.model.state, self.time
+            a, b = excess(here), excess(point)
+            end = begin * (1.0 - fraction)
+            if b <= 0.0:
+                hit = a / (a - b)
+                self._advance(here, blend(here, point, hit), start + hit * (end - start))
+                self._values = self._evaluate()
+                return True
+            self._advance(here, point, end)
+        self._values = self._evaluate()
+        return False
 
     def _walk(self, target: float, *, upward: bool) -> bool:
         """Go towards a time; stop where the largest f crosses 1.

@@ -21,6 +21,7 @@ from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
 from fxcrack.steps.letting_go import TimedRelease
 from fxcrack.steps.loading import BEYOND, Loading
+from fxcrack.steps.opening import SAME_OPENING, OpeningControl
 
 Observer = Callable[[str, Row], None]
 
@@ -88,6 +89,8 @@ class March(Loading):
                 reason = self._run_increments()
             elif self.step.stepping == "path":
                 reason = self._run_path()
+            elif self.step.stepping == "opening":
+                reason = self._run_opening()
             else:
                 reason = self._run_events()
         except (NotPositiveDefinite, ComesApart) as error:
@@ -122,18 +125,48 @@ class March(Loading):
             return "no load acts in this step and no support moves, so the criterion is not reached"
         return _NEVER
 
-    def _run_path(self) -> str:
+    def _only_proportional(self) -> None:
+        """Refuse what a load that moves forth and back cannot do."""
+        stepping = f"stepping='{self.step.stepping}'"
         if self.breaks:
             raise InputError(
-                "stepping='path' follows one proportional load; use the default amplitude for "
+                f"{stepping} follows one proportional load; use the default amplitude for "
                 "all loads of the step"
             )
         for g in self.growths:
             if g.evaluator.breaks() or g.debond.release.driver == "time" or self._ramps:
                 raise InputError(
-                    f"interface '{g.title}' grows or lets go with time, which stepping='path' does "
+                    f"interface '{g.title}' grows or lets go with time, which {stepping} does "
                     "not have: it moves the load forth and back; use 'event' or 'increment'"
                 )
+
+    def _run_opening(self) -> str:
+        self._only_proportional()
+        control = OpeningControl(self.model, self.growths, self.step.monitors)
+        while True:
+            self._rest()
+            reason = self._ended()
+            if reason:
+                return reason
+            if max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
+                return self._ended() or _NEVER
+            if max(self._largest()) < 1.0 - 1e-9:
+                continue  # the end time came first
+            control.reach(self.model.state)
+            self._record("onset")
+            self._free()
+            more = control.excess(self.model.state)
+            same = abs(more) <= SAME_OPENING * control.opening
+            if not same and not (more > 0.0 and self._unload_until(control.excess)):
+                raise InputError(
+                    f"stepping='opening': nodes let go at {self.time:.6g} times the load, and "
+                    f"'{control.name}' = {control.opening:.6g} is not found again at less; control "
+                    "a displacement nearer to the crack, or use stepping='path'"
+                )
+            self._record("release")
+
+    def _run_path(self) -> str:
+        self._only_proportional()
         while True:
             self._rest()
             reason = self._ended()

@@ -36,6 +36,12 @@ class NewtonMarch(March):
                 f"stepping='{self.step.stepping}' looks for equilibria, but Inertia moves the "
                 "bodies in time; use a Dynamic step, or leave Inertia out"
             )
+        if self.step.stepping == "opening":
+            raise InputError(
+                "stepping='opening' needs linear bodies, but this scene takes the nonlinear path; "
+                "use 'path', which follows the load through its falls at f = 1, or prescribe "
+                "displacements"
+            )
         return super().run()
 
     def _walk(self, target: float, *, upward: bool) -> bool:

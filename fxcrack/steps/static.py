@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fxcrack.errors import InputError
 from fxcrack.steps.until import Until, conditions
@@ -18,7 +18,13 @@ class Static:
         stepping: "event" goes from release to release, each at exactly f = 1;
             "increment" takes time increments and accepts 1 <= f <= 1 + tolerance, cutting back
             above; "path" keeps the load factor of a proportional load on the equilibrium path at
-            f = 1, also where that means unloading (snap-back under load control).
+            f = 1, also where that means unloading (snap-back under load control); "opening" finds
+            the load factor of a proportional load from a monitored displacement that never falls:
+            after nodes have let go the load falls until the opening is what it was, and nodes
+            whose f is still 1 or more go at the same opening. Linear bodies without friction.
+        opening: With stepping="opening", the name of the monitor that is controlled, or of two of
+            which it is the first less the second, e.g. both faces at the crack mouth. It must grow
+            with the load.
         initial: First increment, in time. Increment stepping only, as all below.
         minimum: Smallest increment; needing less ends the step.
         maximum: Largest increment.
@@ -32,6 +38,7 @@ class Static:
 
     until: Until | Sequence[Until]
     stepping: str = "event"
+    opening: str | tuple[str, str] | None = field(default=None, kw_only=True)
     initial: float = 0.1
     minimum: float = 1e-9
     maximum: float = float("inf")
@@ -44,8 +51,20 @@ class Static:
     def __post_init__(self) -> None:
         """Check the end and the controls."""
         conditions(type(self).__name__, self.until)
-        if self.stepping not in ("event", "increment", "path"):
-            raise InputError(f"stepping = '{self.stepping}': choose event, increment or path")
+        if self.stepping not in ("event", "increment", "path", "opening"):
+            raise InputError(
+                f"stepping = '{self.stepping}': choose event, increment, path or opening"
+            )
+        if (self.stepping == "opening") != (self.opening is not None):
+            raise InputError(
+                f"stepping = '{self.stepping}' with opening = {self.opening!r}: stepping='opening' "
+                "needs the name of a monitor, or of two to subtract; other steppings take none"
+            )
+        names = self.monitors
+        if not all(isinstance(n, str) for n in names) or len(names) > 2:
+            raise InputError(
+                f"opening = {self.opening!r}: give the name of one monitor, or a pair of names"
+            )
         if not 0.0 < self.minimum <= self.initial <= self.maximum:
             raise InputError(
                 f"increments must satisfy 0 < minimum <= initial <= maximum, "
@@ -59,6 +78,13 @@ class Static:
             raise InputError(
                 f"linear_scaling = {self.linear_scaling} must lie between 0 and 1; 0.9 is usual"
             )
+
+    @property
+    def monitors(self) -> tuple[str, ...]:
+        """Names of the monitors whose displacement, or its difference, is controlled."""
+        if self.opening is None:
+            return ()
+        return (self.opening,) if isinstance(self.opening, str) else tuple(self.opening)
 
     @property
     def ends(self) -> tuple[Until, ...]:
