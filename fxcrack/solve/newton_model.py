@@ -59,13 +59,11 @@ class NewtonModel(TangentModel):
     Arguments as for :class:`~fxcrack.solve.newton_tangent.TangentModel`.
 
     Attributes:
-        at: Time of the accepted state.
         last_move: The last trial.
     """
 
     def __init__(self, *parts: Any, **controls: Any) -> None:
         super().__init__(*parts, **controls)
-        self.at = 0.0
         self._trial_at = 0.0
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: PETSc.Vec | None = None
@@ -368,10 +366,7 @@ class NewtonModel(TangentModel):
         if self._moved or self._condensation is None:
             self._factor()  # the next prediction and the energies need the tangent of this state
             self._moved = False
-        residual = self._out_of_balance(self.state.loads)
-        q = self._anchor(residual, self.state.jump, self.state.loads)
-        q.destroy()
-        residual.destroy()
+        self.anchor()
 
 
 def _along(points: list[tuple[float, Equilibrium]], name: str) -> Array:

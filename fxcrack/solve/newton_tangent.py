@@ -8,6 +8,7 @@ Bodies without their past: moves between equilibria are :mod:`fxcrack.solve.newt
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -50,6 +51,7 @@ class TangentModel(CondensedModel):
         force_scale: Norm of the internal forces at the last residual.
         largest_force: The largest one of an accepted state.
         round_off: Residual that rounding alone may leave there.
+        at: Time of the accepted state.
         pairing_energy: Energy that new pairings of faces that slide have taken so far.
     """
 
@@ -85,6 +87,7 @@ class TangentModel(CondensedModel):
         self._reader = JumpReader(
             continuum, self.pairs, [m for m in self._masters if m is not None]
         )
+        self.at = 0.0
         self.pairing_energy = 0.0
 
     # -- the window and its tangent ------------------------------------------------------
@@ -269,6 +272,46 @@ class TangentModel(CondensedModel):
             system.finish([b for b in leaving if system.soft.switch(b, state.jump)])
             state = system.equilibrium(loads, force)
         return state
+
+    # -- for checkpoints -----------------------------------------------------------------
+
+    def pair_as(self, p: int, parts: dict[str, Any]) -> None:
+        """Give a pair the masters, weights, frames and gaps of another time."""
+        self.pairs[p] = replace(self.pairs[p], **parts)
+
+    def place(self, state: dict[str, Array], time: float) -> None:
+        """Put the bodies into a state from :meth:`Bodies.state` at a time; collective."""
+        if self.continuum.temperature is not None:
+            self.continuum.temperature.set(time)
+        self.bodies.restore(state)
+        self.u.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
+        self._follow_fronts(self.u)
+        self.at = time
+
+    def present_jump(self) -> Array:
+        """Jumps of the window at the accepted displacement, shape (n_window,)."""
+        return self._base.copy()
+
+    def anchor(self) -> None:
+        """Let the dense system pass through the accepted state; collective."""
+        residual = self._out_of_balance(self.state.loads)
+        q = self._anchor(residual, self.state.jump, self.state.loads)
+        q.destroy()
+        residual.destroy()
+
+    def dense(self) -> dict[str, Array]:
+        """The dense system as it is, which need not be that of the accepted displacement."""
+        assert self.system.offset is not None
+        return {
+            "schur": self.system.schur,
+            "offset": self.system.offset,
+            "faces": self.face_loads,
+        }
+
+    def take_dense(self, arrays: dict[str, Array]) -> None:
+        """Go on with a dense system from :meth:`dense` of the same window."""
+        self.system.renew(arrays["schur"], arrays["offset"])
+        self.face_loads = arrays["faces"]
 
     # -- energies and fields -------------------------------------------------------------
 

@@ -56,6 +56,8 @@ def fingerprint(scene: Scene, step: Any, grow: list[bool]) -> dict[str, Any]:
         "order": continuum.order,
         "materials": plain(continuum.part_materials),
         "model": plain(continuum.model),
+        "path": scene.plan.path,
+        "effects": plain(scene.effects),
         "supports": [plain(c.support) for c in scene.supports.columns],
         "loads": plain(scene.loads),
         "monitors": plain(scene.model.monitors),

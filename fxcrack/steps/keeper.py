@@ -75,11 +75,6 @@ class Keeper:
         self._saved: Saved | None = None
         self.resume: dict[str, Any] | None = None
         self.finished = ""
-        if checkpoint is not None and scene.plan.path != "condensed":
-            raise InputError(
-                "checkpoints are kept of linear bodies only, and this scene takes the nonlinear "
-                f"path ({'; '.join(scene.plan.why)}); leave checkpoint out: save= keeps the history"
-            )
         if checkpoint is not None:
             self._print = fingerprint(scene, step, grow)
             if restart:
@@ -213,7 +208,4 @@ def keeper_of(
     if checkpoint is None and scene.kept is not None:
         checkpoint, path, restart = scene.kept
         save = save or path
-        if scene.plan.path != "condensed":
-            log.warn("no checkpoints: they are kept of linear bodies only")
-            checkpoint, restart = None, False
     return Keeper(scene, step, grow, checkpoint=checkpoint, restart=restart, save=save)

@@ -8,7 +8,7 @@ it is the same on every rank.
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, get_args
+from typing import TYPE_CHECKING, Any, cast, get_args
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from fxcrack.steps.records import ReleaseRecord
 
 if TYPE_CHECKING:
     from fxcrack.scene import Scene
+    from fxcrack.solve.newton_model import NewtonModel
     from fxcrack.steps.growth import Growth
 
 _SAME = 1e-9
@@ -35,6 +36,10 @@ def take(scene: Scene, books: dict[str, Any]) -> Saved:
     """
     fatigue = scene.fatigue
     arrays = take_states(scene.model)
+    if not scene.model.linear:
+        from fxcrack.solve.newton_state import take_bodies  # only scenes that need it pay
+
+        arrays |= take_bodies(cast("NewtonModel", scene.model))
     for g in scene.growths:
         arrays |= _take_records(g)
     for i, ramp in enumerate(scene.ramps):
@@ -58,6 +63,10 @@ def give_before_window(scene: Scene, saved: Saved) -> None:
     scene.ramps[:] = [_ramp_of(scene, i, r, arrays) for i, r in enumerate(about["ramps"])]
     scene.model.keep = [(r.p, int(k)) for r in scene.ramps for k in r.nodes]
     give_bonds(scene.model, arrays)
+    if not scene.model.linear:
+        from fxcrack.solve.newton_state import give_bodies
+
+        give_bodies(cast("NewtonModel", scene.model), arrays, about["books"]["time"])
     for g in scene.growths:
         _give_records(g, arrays)
     fatigue, known = scene.fatigue, about["fatigue"]
@@ -82,6 +91,11 @@ def give_after_window(scene: Scene, saved: Saved) -> None:
             f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or mend the "
             "scene"
         )
+    if not scene.model.linear:
+        from fxcrack.solve.newton_state import give_accepted
+
+        give_accepted(cast("NewtonModel", scene.model), saved.arrays)
+        return
     force = given_forces(scene.model, scene.ramps, books["time"], books["increment"])
     give_equilibrium(scene.model, saved.arrays, force)
 

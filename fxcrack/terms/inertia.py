@@ -149,19 +149,25 @@ class InertiaForces(Term):
         if not dt > 0.0:
             raise SolverError(f"inertia: an increment of length {dt} is no motion; it must be > 0")
         self._moving = True
-        alpha_m, alpha_f, beta, gamma = self._effect.parameters
+        alpha_m, alpha_f, _, gamma = self._effect.parameters
         last, keep = self._last, 1.0 - alpha_f
-        if dt != self._dt:
-            self._dt = dt
-            self.version += 1
-            self._b_u.value = (1.0 - alpha_m) / (beta * dt**2 * keep)
-            self._c_u.value = gamma / (beta * dt)
+        self._take_dt(dt)
         a = self._known_acceleration(last)
         self._b_known.x.array[:] = (
             (1.0 - alpha_m) * a + alpha_m * last["a"] - alpha_f * last["b"]
         ) / keep
         v = last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
         self._c_known.x.array[:] = v + alpha_f * (last["v"] - last["c"]) / keep
+
+    def _take_dt(self, dt: float) -> None:
+        """Set b_u and c_u for increments of a length; 0 before the first one."""
+        if dt == self._dt:
+            return
+        alpha_m, alpha_f, beta, gamma = self._effect.parameters
+        self._dt = dt
+        self.version += 1
+        self._b_u.value = (1.0 - alpha_m) / (beta * dt**2 * (1.0 - alpha_f)) if dt > 0.0 else 0.0
+        self._c_u.value = gamma / (beta * dt) if dt > 0.0 else 0.0
 
     def _known_acceleration(self, last: dict[str, Array]) -> Array:
         """The part of the new acceleration that is not u/(beta dt^2)."""
@@ -229,13 +235,19 @@ class InertiaForces(Term):
     def state(self) -> dict[str, Array]:
         """Motion of the last commit and sums."""
         out = {name: value.copy() for name, value in self._last.items()}
-        return out | {"sums": np.array(list(self._spent.values()))}
+        return out | {"sums": np.array(list(self._spent.values())), "dt": np.array([self._dt])}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`."""
+        """Set the committed state from :meth:`state`, with the tangent of its last increment."""
         self._last = {name: state[name].copy() for name in REMEMBERED}
         self._spent = dict(zip(self._spent, (float(x) for x in state["sums"]), strict=True))
-        self._dt, self._moving = 0.0, False
+        self._moving = False
+        self._take_dt(float(state["dt"][0]))
+        for known, name, factor in (
+            (self._b_known, "b", self._b_u),
+            (self._c_known, "c", self._c_u),
+        ):
+            known.x.array[:] = self._last[name] - float(factor.value) * self._last["u"]
         self.velocity.x.array[:] = self._last["v"]
 
 

@@ -112,6 +112,21 @@ def fatigue(comm: MPI.Intracomm) -> fx.Scene:
     return short(comm, criterion=fx.Fatigue(GIc=0.4, paris=LAW))
 
 
+def bent(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
+    """Arms that turn far: opened, pressed together, opened further; the faces slide."""
+    way = fx.Amplitude((0.0, 1.0, 2.0, 4.0), (0.0, 3.0, -0.02, 6.0))
+    pins = [fx.Displacement(p.where, y=np.sign(p.y), amplitude=way) for p in PINS]
+    interface = bond(6.0, contact=True, friction=options.pop("friction", None))
+    return fx.Scene(
+        dcb_2d(comm, length=20.0, dx=1.0, ny=1),
+        materials=options.pop("materials", fx.Isotropic(7e3, 0.3)),
+        model=fx.PlaneStrain(),
+        supports=[*HELD_FAR, *pins],
+        debonds=[fx.Debond(interface, fx.VCCT(GIc=2.0, tolerance=0.3))],
+        **{"effects": [fx.FiniteStrain()], **options},
+    )
+
+
 RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | fx.Cycles]]] = {
     "event": (short, [fx.Static(until=fx.Releases(10))]),
     "event, contact, small windows": (
@@ -191,6 +206,43 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         ),
         [fx.Static(until=fx.Time(1.0))],
     ),
+    "finite strain, event, turning load": (bent, [fx.Static(until=fx.Time(4.0))]),
+    "finite strain, increments, friction": (
+        lambda comm: bent(comm, friction=0.3),
+        [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
+    ),
+    "plastic": (
+        lambda comm: bent(
+            comm, materials=fx.Plastic(70e3, 0.3, yield_stress=40.0, hardening=1e3), effects=[]
+        ),
+        [fx.Static(until=fx.Time(3.0), initial=0.1, maximum=0.1, **INCREMENTS)],
+    ),
+    "nonlinear path, progressive": (
+        lambda comm: short(comm, fx.Progressive(), path="newton"),
+        [fx.Static(until=fx.Releases(4))],
+    ),
+    "inertia, finite strain": (
+        lambda comm: bent(
+            comm, effects=[fx.FiniteStrain(), fx.Inertia(density=1e-5, rayleigh=(0.0, 1e-3))]
+        ),
+        [fx.Dynamic(until=fx.Time(3.0), dt=0.1)],
+    ),
+    "pressure that follows, temperature": (
+        lambda comm: bent(
+            comm,
+            materials=fx.Isotropic(7e3, 0.3, expansion=1e-5),
+            loads=[
+                fx.Pressure(
+                    "top", 0.5, amplitude=fx.Amplitude((0.0, 4.0), (0.0, 4.0)), follows=True
+                )
+            ],
+            effects=[
+                fx.FiniteStrain(),
+                fx.Temperature([(0.0, 0.0), (4.0, lambda x: 50.0 + x[0])]),
+            ],
+        ),
+        [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
+    ),
     "fatigue": (fatigue, [fx.Cycles(maximum=0.5, ratio=0.1, until=fx.Releases(6))]),
     "fatigue in two steps": (
         fatigue,
@@ -219,7 +271,13 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     ),
 }
 
-QUICK = ("increments", "progressive", "fatigue in two steps", "3-D")
+QUICK = (
+    "increments",
+    "progressive",
+    "finite strain, increments, friction",
+    "fatigue in two steps",
+    "3-D",
+)
 """The others take a second or two each on a busy machine."""
 
 
@@ -252,6 +310,7 @@ def assert_same_history(whole: fx.History, found: fx.History) -> None:
     if "s11" in largest:
         largest |= {k: largest["s11"] for k in ("s12", "s13")}
     energies = ("balance", "snap_energy", "released_energy", "viscous_energy")
+    energies += ("friction_energy", "pairing_energy")
     largest |= {k: largest["external_work"] for k in energies}
     # reactions beside the forces they balance
     largest["R"] = max(largest["R"], largest.get("F", 0.0))
@@ -414,14 +473,18 @@ def test_functions_that_give_something_else_are_found_by_the_equilibrium(
     other.close()
 
 
-def test_nonlinear_bodies_are_told_that_they_have_no_checkpoints(
-    comm: MPI.Intracomm, shared_path: Path
-) -> None:
-    step = fx.Static(until=fx.Releases(1))
-    scene = short(comm, effects=[fx.FiniteStrain()])
-    with pytest.raises(fx.InputError, match=r"kept of linear bodies only.*finite strain"):
-        scene.run(step, checkpoint=fx.Checkpoint(shared_path / "state.npz"))
-    scene.close()
+def test_nonlinear_bodies_need_the_same_ranks(comm: MPI.Intracomm, shared_path: Path) -> None:
+    step = fx.Static(until=fx.Time(0.2))
+    checkpoint = fx.Checkpoint(shared_path / "state.npz")
+    bent(comm).run(step, checkpoint=checkpoint)
+    comm.Barrier()
+    if comm.rank == 0:
+        with np.load(checkpoint.path) as content:
+            arrays = dict(content)
+        np.savez(checkpoint.path, **{**arrays, "ranks": np.array(comm.size + 1)})
+    comm.Barrier()
+    with pytest.raises(fx.InputError, match=f"bodies on {comm.size + 1} ranks.*without restart"):
+        bent(comm).run(step, checkpoint=checkpoint, restart=True)
 
 
 def test_without_a_checkpoint_a_restart_begins_and_rubbish_is_refused(
