@@ -75,7 +75,7 @@ def test_stays_within_its_limits(verdicts: list[bool], growth: float, cutback: f
 @pytest.mark.parametrize(
     ("controls", "message"),
     [
-        ({"stepping": "leap"}, "stepping = 'leap': choose event, increment or path"),
+        ({"stepping": "leap"}, "stepping = 'leap': choose event, increment, path or opening"),
         ({"initial": 0.0}, "0 < minimum <= initial <= maximum"),
         ({"minimum": 0.2}, "0 < minimum <= initial <= maximum"),
         ({"maximum": 0.01}, "0 < minimum <= initial <= maximum"),
