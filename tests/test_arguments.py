@@ -100,3 +100,13 @@ def test_a_dynamic_step_needs_inertia(mesh: fx.Mesh) -> None:
 def test_a_scene_without_load_says_so(mesh: fx.Mesh) -> None:
     still = [fx.Displacement("pin_top", x=0.0, y=0.0), fx.Displacement("pin_bottom", x=0.0, y=0.0)]
     assert "no load acts" in run(mesh, supports=still).reason
+
+
+@pytest.mark.parametrize("method", ["vcct", "closure"])
+def test_arms_that_are_pressed_together_never_separate(mesh: fx.Mesh, method: str) -> None:
+    """Without contact G_I is negative and counts as zero; what is left is round-off of G_II."""
+    press = [fx.Displacement("pin_top", x=0.0, y=-1.0), fx.Displacement("pin_bottom", x=0.0, y=1.0)]
+    debonds = [fx.Debond(BOND, fx.VCCT(GIc=0.2, method=method))]
+    history = run(mesh, supports=press, debonds=debonds)
+    assert "not reached" in history.reason
+    assert not any(row["event"] == "release" for row in history)

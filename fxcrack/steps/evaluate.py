@@ -151,6 +151,7 @@ class RateEvaluator:
         force, opening = (
             m.reshape(len(tips), -1, 3) for m in (measured[:, :half], measured[:, half : 2 * half])
         )
+        force = _real(force)
         if self.criterion.method == "closure":
             return closure_rates(force, opening, tips.area)
         if tips is not self._weighed:
@@ -250,6 +251,18 @@ class RateEvaluator:
     def breaks(self) -> tuple[float, ...]:
         """Rates do not depend on time as such; a temperature does."""
         return self._temperature.breaks() if self._temperature is not None else ()
+
+
+_NO_MODE = 1e-11
+"""Forces of a mode below this fraction of the largest are round-off. A mode so weak would have
+1e-22 of the rate of the others; alone, beside pressure, it would ask for loads without end."""
+
+
+def _real(force: Array) -> Array:
+    """Bond forces without the modes that are there by round-off alone, shape (n, k, 3)."""
+    size = np.abs(force).max(axis=1, initial=0.0)
+    none = size < _NO_MODE * size.max(axis=1, keepdims=True, initial=0.0)
+    return np.where(none[:, None], 0.0, force)
 
 
 UNBOUNDED_RATE = 1e50
