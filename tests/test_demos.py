@@ -163,10 +163,10 @@ def test_main_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 
 def test_large_rotation_follows_the_elastica() -> None:
-    scene, rows = large_dcb.run(dx=1.0, ny=2, until=42.0)
+    scene, rows = large_dcb.run(dx=0.5, ny=2, until=41.0)
     for a, opening, load, rate, _ in rows:
         exact, exact_rate = large_dcb.at_opening(a, opening)
-        # asked for are 2 %; 0.7 % is left at half the size, beam theory has no shear in it
+        # asked for are 2 %; 0.7 % of the load is left, 1.1 % of G: beam theory has no shear in it
         assert load == pytest.approx(exact, rel=0.02)
         assert rate == pytest.approx(exact_rate, rel=0.02)
         assert large_dcb.corrections(a, opening)[0] > 1.1  # far from small rotations
