@@ -12,6 +12,7 @@ so any system of units will do.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -52,7 +53,7 @@ def total(rates: npt.ArrayLike) -> Array:
 
 
 @dataclass(frozen=True)
-class _ShearExponent:
+class _ShearExponent(ABC):
     """What the laws have in common that blend toughnesses by the share of shear, B^eta."""
 
     eta: float
@@ -83,9 +84,9 @@ class _ShearExponent:
         """
         return total(rates) / self.critical(rates, toughness)
 
+    @abstractmethod
     def _in_shear(self, g2: Array, g3: Array, tear: Array) -> Array:
         """Toughness in pure shear of which mode III has a share, shape (n,)."""
-        raise NotImplementedError
 
 
 @dataclass(frozen=True)

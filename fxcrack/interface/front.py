@@ -124,10 +124,11 @@ class Front:
         centre = s.x[corner[mixed]].mean(axis=1)
         distance = np.linalg.norm(s.x[:, None] - centre[None], axis=2)
         beyond = (distance - distance.min(axis=1, keepdims=True)) / (2.0 * s.facet_size)
-        mean = np.exp(-(beyond**2)) @ direction
+        weight = np.exp(-(beyond**2))
+        mean = weight @ direction
         length = np.linalg.norm(mean, axis=1, keepdims=True)
         # opposite fronts at one distance: no mean, the first of them
-        lost = length < 0.5 * np.exp(-(beyond**2)).sum(axis=1, keepdims=True)
+        lost = length < 0.5 * weight.sum(axis=1, keepdims=True)
         nearest = direction[np.argmin(distance, axis=1)]
         return np.where(lost, nearest, mean / np.maximum(length, 1e-300))
 

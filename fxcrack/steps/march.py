@@ -149,7 +149,7 @@ class March(Loading):
             if reason:
                 return reason
             if max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
-                return self._ended() or _NEVER
+                return self._ended() or self._never()
             if max(self._largest()) < 1.0 - 1e-9:
                 continue  # the end time came first
             control.reach(self.model.state)
