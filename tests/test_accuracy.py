@@ -43,6 +43,18 @@ def stuck(setting: Setting) -> Case:
 
 def wrong(setting: Setting) -> Case:
     raise ZeroDivisionError("by design")
+
+def first_wrong(setting: Setting) -> Case:
+    return _wrong_on(0)
+
+def second_wrong(setting: Setting) -> Case:
+    return _wrong_on(1)
+
+def _wrong_on(rank: int) -> Case:
+    from mpi4py import MPI
+    if MPI.COMM_WORLD.rank == rank:
+        raise ZeroDivisionError(f"by design on {rank}")
+    MPI.COMM_WORLD.Barrier()
 """
 
 
@@ -98,6 +110,11 @@ def test_nothing_hangs_and_a_failure_does_not_end_the_study(own: str) -> None:
         for ranks in (1, 2):
             with pytest.raises(SettingFailed, match="ZeroDivisionError: by design"):
                 workers.run(replace(setting, ranks=ranks), 30.0)
+    two = replace(setting, ranks=2)
+    for rank, name in enumerate(("first_wrong", "second_wrong")):  # the other one waits for it
+        with Workers(f"{own}:{name}") as workers:
+            with pytest.raises(SettingFailed, match=f"by design on {rank}"):
+                workers.run(two, 30.0)
     with pytest.raises(InputError, match=r"no setting gave a result.*ZeroDivisionError"):
         run(f"{own}:wrong", budget=40.0, sizes=(2.0,))
 

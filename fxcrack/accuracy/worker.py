@@ -36,6 +36,7 @@ SHORT = 0.5
 """The limit, seconds."""
 _COMPILED = 0.05  # seconds: forms found compiled take milliseconds
 _NAP = 0.002  # seconds between two looks for a message: waiting ranks leave the cores to others
+_PATIENCE = 1.0  # seconds a failed rank waits for the others to fail too
 _TAG = 7
 
 Result = dict[str, Any]
@@ -158,9 +159,25 @@ def _next(comm: MPI.Intracomm, parent: int) -> dict[str, Any] | None:
     return received
 
 
+def _all_failed(comm: MPI.Intracomm) -> bool:
+    """Whether every rank gets here before long: one that has not failed may wait for this one."""
+    met = comm.Ibarrier()
+    deadline = time.monotonic() + _PATIENCE
+    while not met.Test():
+        if time.monotonic() > deadline:
+            return False
+        time.sleep(_NAP)
+    return True
+
+
 def main() -> None:
-    """Serve until the input ends."""
+    """Serve until the input ends.
+
+    After an error on several ranks whoever reads the answers ends them all: where some of them hang
+    nothing else would, and an abort from here may overtake the answer.
+    """
     comm = MPI.COMM_WORLD
+    failures = comm.Dup()  # collectives of failed ranks do not mix with those of the others
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)  # whatever libraries print must not mix with the answers
     parent = os.getppid()
@@ -169,17 +186,20 @@ def main() -> None:
     gc.freeze()  # collections between runs need not visit what the imports made
     if comm.rank == 0:
         print(MARK + json.dumps({"ready": fxcrack.__version__}), file=answers, flush=True)
+    torn = False
     while (request := _next(comm, parent)) is not None:
         answer: dict[str, Any]
         try:
             answer = {"result": run(study, Setting(**request), comm)}
         except Exception as error:  # a scene function may raise anything: the study goes on
             answer = {"error": f"{type(error).__name__}: {error}"}
-        if comm.rank == 0:
+        if comm.rank == 0 or ("error" in answer and not _all_failed(failures)):
             print(MARK + json.dumps(answer), file=answers, flush=True)
-        if "error" in answer and comm.size > 1:
-            comm.Abort(1)  # the others may not have failed: start anew
+        if comm.rank == 0 and "error" in answer:
+            torn = not _all_failed(failures)
         gc.collect()
+    if torn:
+        comm.Abort(1)
 
 
 if __name__ == "__main__":
