@@ -108,16 +108,22 @@ def suite(
 ) -> list[Case]:
     """Cases for all sizes; several ranks and a large window at the middle size only.
 
-    In 2-D the direct method alone is measured, at sizes five times as large.
+    Without 1 among the ranks all sizes run on each of them, and nothing else. In 2-D the direct
+    method alone is measured, at sizes five times as large.
     """
     middle = sorted(sizes)[len(sizes) // 2]
     out = []
     for shape in shapes:
         factor = 5.0 if shape == "plane" else 1.0
         for method in methods if shape != "plane" else ["schur"]:
+            if 1 not in ranks:
+                out += [
+                    Case(shape, factor * s, method, False, p) for s in sorted(sizes) for p in ranks
+                ]
+                continue
             out += [Case(shape, factor * s, method, False, 1) for s in sorted(sizes)]
             out += [Case(shape, factor * middle, method, False, p) for p in ranks if p > 1]
-        if "schur" in methods:
+        if "schur" in methods and 1 in ranks:
             out.append(Case(shape, factor * middle, "schur", True))
     return out
 

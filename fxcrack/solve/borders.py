@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack import compat
@@ -61,61 +62,121 @@ def border_vectors(
     return out
 
 
-def bordered_matrix(
-    stiffness: PETSc.Mat, coordinates: JumpCoordinates, borders: list[PETSc.Vec]
-) -> tuple[PETSc.Mat, Array]:
-    """A with its borders; destroys nothing; collective.
+class BorderedMatrix:
+    """A = T^t K T with its borders; collective.
 
-    Returns:
-        The matrix, and what each border holds in the window rows (for a force pattern minus the
-        load on the slave face), shape (n_window, n_borders), on every rank.
+    Args:
+        stiffness: K; stays with the caller.
+        coordinates: T and its numbering.
+        borders: From :func:`border_vectors`; stay with the caller.
+        renewable: Whether K changes later on; memory for that is kept then.
+
+    Attributes:
+        matrix: The matrix.
+        on_window: What each border holds in the window rows (for a force pattern minus the load on
+            the slave face), shape (n_window, n_borders), on every rank.
     """
-    inner = stiffness.ptap(coordinates.transform)
-    on_window = np.zeros((coordinates.n_window, len(borders)))
-    if not borders:
-        return inner, on_window
-    comm = compat.plain_comm(inner.getComm().tompi4py())
-    (n_rows, n_columns), _ = inner.getSizes()
-    indptr, indices, data = inner.getValuesCSR()
-    first = coordinates.first + coordinates.n_window + coordinates.n_supports
-    parts: list[Any] = [sp.csr_matrix((data, indices, indptr), shape=(n_rows, n_columns))]
-    start, _ = inner.getOwnershipRange()
-    right = inner.createVecRight()
-    for i, border in enumerate(borders):
-        coordinates.transform.multTranspose(border, right)
-        if comm.rank == 0:
-            window = slice(coordinates.n_inner, coordinates.n_inner + coordinates.n_window)
-            on_window[:, i] = right.array[window]
-        local = np.flatnonzero(right.array)
-        values = right.array[local]
-        parts.append(
-            sp.csr_matrix(
-                (values, (local, np.full(len(local), first + i))), shape=(n_rows, n_columns)
+
+    def __init__(
+        self,
+        stiffness: PETSc.Mat,
+        coordinates: JumpCoordinates,
+        borders: list[PETSc.Vec],
+        *,
+        renewable: bool = False,
+    ) -> None:
+        self._transform = coordinates.transform
+        self._inner: PETSc.Mat | None = None  # without borders, where that is another matrix
+        self._where: Ints = np.zeros(0, dtype=np.int64)  # its entries among those of the whole
+        inner = stiffness.ptap(coordinates.transform)
+        self.on_window = np.zeros((coordinates.n_window, len(borders)))
+        if not borders:
+            self.matrix = inner
+            return
+        comm = compat.plain_comm(inner.getComm().tompi4py())
+        shape, _ = inner.getSizes()
+        indptr, indices, data = inner.getValuesCSR()
+        parts: list[Any] = [sp.csr_matrix((data, indices, indptr), shape=shape)]
+        parts += self._border_parts(inner, coordinates, borders, comm)
+        comm.Bcast(self.on_window)
+        if renewable:  # zeros are stored as well: they may not be zero next time
+            coo = [part.tocoo() for part in parts]
+            row, col, value = (
+                np.concatenate([getattr(c, name) for c in coo]) for name in ("row", "col", "data")
             )
+            total = sp.coo_matrix((value, (row, col)), shape=shape).tocsr()
+        else:
+            total = sum(parts[1:], parts[0])
+        total.sort_indices()
+        self.matrix = PETSc.Mat().createAIJ(
+            (shape, shape),
+            csr=(
+                total.indptr.astype(PETSc.IntType),
+                total.indices.astype(PETSc.IntType),
+                total.data,
+            ),
+            comm=stiffness.getComm(),
         )
-        found: Any = comm.gather((local + start, values))
-        if comm.rank == 0:
-            columns, entries = (np.concatenate(p) for p in zip(*found, strict=True))
-            # a stored diagonal, however small: without one the symmetric conversion goes wrong
-            columns = np.append(columns, first + i)
-            entries = np.append(entries, 1e-300)
-            row = np.full(len(columns), first + i)
-            parts.append(sp.csr_matrix((entries, (row, columns)), shape=(n_rows, n_columns)))
-    right.destroy()
-    inner.destroy()
-    total = parts[0]
-    for part in parts[1:]:
-        total = total + part
-    total.sort_indices()
-    matrix = PETSc.Mat().createAIJ(
-        ((n_rows, n_columns), (n_rows, n_columns)),
-        csr=(
-            total.indptr.astype(PETSc.IntType),
-            total.indices.astype(PETSc.IntType),
-            total.data,
-        ),
-        comm=stiffness.getComm(),
-    )
-    matrix.assemble()
-    comm.Bcast(on_window)
-    return matrix, on_window
+        self.matrix.assemble()
+        if not renewable:
+            inner.destroy()
+            return
+        self._inner, self._total = inner, total
+        own, all_ = (
+            np.repeat(np.arange(shape[0], dtype=np.int64), np.diff(p)) * shape[1] + i
+            for p, i in ((indptr, indices), (total.indptr, total.indices))
+        )
+        self._where = np.searchsorted(all_, own)
+        self._total.data[self._where] -= data  # borders alone
+
+    def _border_parts(
+        self,
+        inner: PETSc.Mat,
+        coordinates: JumpCoordinates,
+        borders: list[PETSc.Vec],
+        comm: MPI.Intracomm,
+    ) -> list[Any]:
+        """This rank's rows and columns of every border."""
+        shape, _ = inner.getSizes()
+        first = coordinates.first + coordinates.n_window + coordinates.n_supports
+        start, _ = inner.getOwnershipRange()
+        right, parts = inner.createVecRight(), []
+        for i, border in enumerate(borders):
+            coordinates.transform.multTranspose(border, right)
+            if comm.rank == 0:
+                window = slice(coordinates.n_inner, coordinates.n_inner + coordinates.n_window)
+                self.on_window[:, i] = right.array[window]
+            local = np.flatnonzero(right.array)
+            values = right.array[local]
+            parts.append(
+                sp.csr_matrix((values, (local, np.full(len(local), first + i))), shape=shape)
+            )
+            found: Any = comm.gather((local + start, values))
+            if comm.rank == 0:
+                columns, entries = (np.concatenate(p) for p in zip(*found, strict=True))
+                # a stored diagonal, however small: without one the symmetric conversion goes wrong
+                columns = np.append(columns, first + i)
+                entries = np.append(entries, 1e-300)
+                row = np.full(len(columns), first + i)
+                parts.append(sp.csr_matrix((entries, (row, columns)), shape=shape))
+        right.destroy()
+        return parts
+
+    def renew(self, stiffness: PETSc.Mat) -> None:
+        """Take another K with the same nonzero pattern; collective."""
+        if self._inner is None:
+            stiffness.ptap(self._transform, result=self.matrix)
+            return
+        stiffness.ptap(self._transform, result=self._inner)
+        data = self._total.data.copy()
+        data[self._where] += self._inner.getValuesCSR()[2]
+        structure = self._total.indptr, self._total.indices
+        indptr, indices = (x.astype(PETSc.IntType) for x in structure)
+        self.matrix.setValuesCSR(indptr, indices, data)
+        self.matrix.assemble()
+
+    def destroy(self) -> None:
+        """Free the matrices; collective."""
+        self.matrix.destroy()
+        if self._inner is not None:
+            self._inner.destroy()

@@ -19,7 +19,7 @@ from petsc4py import PETSc
 from fxcrack import compat
 from fxcrack.errors import InputError, SolverError
 from fxcrack.interface.jumps import JumpCoordinates
-from fxcrack.solve.borders import bordered_matrix
+from fxcrack.solve.borders import BorderedMatrix
 from fxcrack.solve.petsc_schur import (
     TOO_SMALL,
     WORKSPACE,
@@ -56,11 +56,12 @@ class Condensation:
         method: "schur" takes S out of MUMPS, "columns" builds it by block solves, "auto" takes
             the first where it can.
         definite: Whether the inner block must be positive definite.
+        renewable: Whether :meth:`renew` is called later on; memory for that is kept then.
 
     Attributes:
         schur: S, shape (n_last, n_last), the same on every rank.
         n_negative: Negative pivots of the inner block, where it need not be definite.
-        borders_on_window: See :func:`bordered_matrix`.
+        borders_on_window: See :class:`BorderedMatrix`.
         diagonal: That of A on the last coordinates, shape (n_last,): S is a difference from it.
     """
 
@@ -73,6 +74,7 @@ class Condensation:
         *,
         method: str = "auto",
         definite: bool = True,
+        renewable: bool = False,
     ) -> None:
         if method not in ("auto", "schur", "columns"):
             raise InputError(f"method = '{method}': choose 'auto', 'schur' or 'columns'")
@@ -84,27 +86,50 @@ class Condensation:
         self._factor: SchurFactor | None = None
         self._inner: PETSc.KSP | None = None
         self._inner_matrix: PETSc.Mat | None = None
+        self._by_schur = method == "schur" or (method == "auto" and library() is not None)
         start = time.perf_counter()
-        self.matrix, self.borders_on_window = bordered_matrix(stiffness, coordinates, borders)
+        self._bordered = BorderedMatrix(stiffness, coordinates, borders, renewable=renewable)
+        self.matrix, self.borders_on_window = self._bordered.matrix, self._bordered.on_window
         self.diagonal = self._last_diagonal()
         timings.add("transform", start)
+        self._condense(gdim=stiffness.getBlockSize())
+
+    def renew(self, stiffness: PETSc.Mat) -> None:
+        """Condense another K with the same nonzero pattern, in the memory at hand; collective.
+
+        Raises:
+            SolverError: MUMPS failed; the message says why.
+        """
         start = time.perf_counter()
-        if method == "schur" or (method == "auto" and library() is not None):
-            self._factor = SchurFactor(
-                self.matrix,
-                coordinates.n_last,
-                gdim=stiffness.getBlockSize(),
-                definite=definite,
-            )
+        if self._inner is not None:
+            self._inner.destroy()
+        if self._inner_matrix is not None:
+            self._inner_matrix.destroy()
+        self._inner = self._inner_matrix = None
+        self._bordered.renew(stiffness)
+        self.diagonal = self._last_diagonal()
+        self.timings.add("transform", start)
+        self._condense(gdim=stiffness.getBlockSize())
+
+    def _condense(self, *, gdim: int) -> None:
+        """Take S out of a factorisation of the matrix, or build it; collective."""
+        start = time.perf_counter()
+        if self._by_schur:
+            if self._factor is None:
+                self._factor = SchurFactor(
+                    self.matrix, self.coordinates.n_last, gdim=gdim, definite=self._definite
+                )
+            else:
+                self._factor.renew(self.matrix)
             self.n_negative = self._factor.n_negative
-            timings.factorizations += 1
+            self.timings.factorizations += 1
             self.schur = self._factor.schur
             if not self._factor.solves:
                 self._factor.destroy()  # nothing needs its memory any more
                 self._factor = None
         else:
             self.schur = self._columns()
-        timings.add("factor_with_schur", start)
+        self.timings.add("factor_with_schur", start)
         if not np.all(np.isfinite(self.schur)):
             raise SolverError(mumps_message(-10, 0))
 
@@ -314,6 +339,6 @@ class Condensation:
             self._inner.destroy()
         if self._inner_matrix is not None:
             self._inner_matrix.destroy()
-        self.matrix.destroy()
+        self._bordered.destroy()
         if not keep_transform:
             self.coordinates.transform.destroy()

@@ -125,6 +125,11 @@ class LinearJumps:
         Raises:
             NotPositiveDefinite: The free components have no stable equilibrium with it.
         """
+        if schur is self.schur and self.offset is not None:
+            self.offset = offset
+            right = offset[self.cholesky.free]
+            self._forward = np.column_stack([self._forward[:, :-1], self.cholesky.forward(right)])
+            return
         free, bonds, old = self.cholesky.free, self.soft.bonds, (self.schur, self.offset)
         try:
             self._take(schur, offset, free, bonds)

@@ -23,6 +23,14 @@ from fxcrack.solve.cholesky import NotPositiveDefinite
 
 Array = npt.NDArray[np.float64]
 
+_NEAR = 1e-3
+"""Where the prediction is out of balance by more than this part of the forces, the tangent there is
+made first."""
+_SLOW = 0.3
+"""A tangent that leaves more of the residual than this is not used again."""
+_MANY = 2
+"""Nor one that would need more steps than this: they cost as much as a new one or more."""
+
 REASONS = {
     -1: "the function left its domain",
     -2: "too many function evaluations",
@@ -47,11 +55,14 @@ class NewtonOptions:
         tolerance: Residual over the forces in the bodies at which the iteration ends; these are
             the larger ones of those at the increment's start and those at the iterate, at least
             round-off of the largest so far.
-        max_iterations: Iterations allowed in one solve.
+        max_iterations: Iterations with a new tangent allowed in one solve.
+        reuse: Iterate with the tangent at hand as long as the residual falls fast with it; else
+            every iteration has its own (Newton's method to the letter, quadratic at the end).
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 25
+    reuse: bool = True
 
 
 @dataclass
@@ -102,6 +113,27 @@ class InterfaceProblem:
         """What a callback raised; PETSc passes on an error code only."""
         self._last: tuple[PETSc.Vec, PETSc.Vec, Array, Array] | None = None
         self._residual: PETSc.Vec | None = None
+        self._norms: list[float] = []
+        self._level = 0.0  # the norm at which the iteration ends
+        self._steps_since = 0  # with the present tangent
+        self.drift = 0.0
+        """What was out of balance where the last tangent was made, over the forces."""
+        self.renewed = False
+        """Whether a tangent was made on the way."""
+        self._reused = 0
+
+    def _worn(self) -> bool:
+        """Whether a new tangent comes cheaper than going on with the present one."""
+        if not self.model.newton.reuse:
+            return True
+        if self._steps_since == 0:
+            return self._norms[-1] > _NEAR * self.scale
+        rate = self._norms[-1] / self._norms[-2]
+        if self.fraction != 1.0 or rate >= _SLOW:
+            return True
+        if not self.model.bodies.symmetric:
+            return False  # S is that of the symmetric part: another one is no better
+        return float(np.log(self._level / self._norms[-1])) < _MANY * float(np.log(rate))
 
     def residual(self, snes: Any, y: PETSc.Vec, out: PETSc.Vec) -> None:
         """T^t r(u) minus the interface forces that belong to y."""
@@ -146,7 +178,12 @@ class InterfaceProblem:
         model = self.model
         assert self._residual is not None
         jump = model.jumps_of(y)
-        model.linearise(jump, self.loads, self._residual, out)
+        if model.linearise(jump, self.loads, self._residual, out, anew=self._worn()):
+            self.renewed, self._steps_since = True, 0
+            self.drift = self._norms[-1] / self.scale
+        else:
+            self._reused += 1
+        self._steps_since += 1
         start = time.perf_counter()
         self.solution = model.interface_equilibrium(self.loads, self.force)
         model.timings.add("interface", start)
@@ -172,9 +209,13 @@ class InterfaceProblem:
         level = max(
             self.model.newton.tolerance * max(self.scale, forces), self.model.round_off, round_off
         )
+        self._norms.append(norm)
+        self._level = level
+        if its == 0:
+            self.drift = norm / self.scale if norm > level else 0.0
         if norm <= level and self.fraction == 1.0:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
-        if its >= self.model.newton.max_iterations:
+        if its - self._reused >= self.model.newton.max_iterations:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)
         return 0
 
@@ -246,7 +287,7 @@ def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
     pc = ksp.getPC()
     pc.setType(PETSc.PC.Type.PYTHON)
     pc.setPythonContext(stepper)
-    snes.setTolerances(max_it=problem.model.newton.max_iterations + 1)
+    snes.setTolerances(max_it=(_MANY + 2) * (problem.model.newton.max_iterations + 1))
     snes.setFromOptions()
     try:
         snes.solve(None, y)

@@ -1,17 +1,12 @@
 """A model whose bodies are nonlinear, with the interface of a condensed model.
 
-Between two accepted states the dense system holds the tangent: it predicts the way (contact and
-softening followed exactly on it), SNES corrects the end, and the integrals along the way are those
-of the prediction plus the correction e, whose value and rate are zero at the start:
-
-    int_0^1 e ds = e(1)/2 - e'(1)/12      (cubic in s)
+Between two accepted states the dense system holds the tangent: it predicts the way, SNES corrects
+the end (:mod:`fxcrack.solve.newton_way`).
 """
 
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -20,37 +15,26 @@ from petsc4py import PETSc
 
 from fxcrack.errors import ConvergenceError
 from fxcrack.solve import newton
-from fxcrack.solve.jump_system import Equilibrium, bond_work
+from fxcrack.solve.cholesky import NotPositiveDefinite
+from fxcrack.solve.jump_system import Equilibrium
+from fxcrack.solve.linear_jumps import Snapshot
 from fxcrack.solve.newton import InterfaceProblem
 from fxcrack.solve.newton_tangent import TangentModel
+from fxcrack.solve.newton_way import Move, Way
 from fxcrack.solve.rubbing import Slide
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
+_FAR_OFF = 1e-5
+"""A tangent made where more than this part of the forces was out of balance gives way to that of
+the state itself when one is accepted."""
+_UNSTABLE = (
+    "the equilibrium found is unstable (buckling, or a limit load was passed); take smaller "
+    "increments, or control a displacement instead of a force"
+)
 _SMALLEST_PIECE = 1e-4
 """Part of a bond force whose removal is the least that is tried at once."""
-
-
-@dataclass(frozen=True)
-class Move:
-    """The way from one equilibrium to another, loads and given forces linear in s from 0 to 1.
-
-    Attributes:
-        start: Where it begins.
-        end: Where it ends.
-        conjugate: Integral of the conjugates over s, shape (n_loads,).
-        jump: Integral of the jumps over s, shape (n_window,).
-        bonds: Energy that bonds which are letting go took out on the way.
-        friction: Energy that friction took on the way.
-    """
-
-    start: Equilibrium
-    end: Equilibrium
-    conjugate: Array
-    jump: Array
-    bonds: float
-    friction: float
 
 
 class NewtonModel(TangentModel):
@@ -67,6 +51,9 @@ class NewtonModel(TangentModel):
         self._trial_at = 0.0
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: PETSc.Vec | None = None
+        self._trial_drift = 0.0
+        self._answers = np.zeros(0)  # forces of the last coordinates at the trial's end
+        self._way: Way | None = None  # to a trial that is not confirmed yet
         self.last_move: Move | None = None
         self._replaced: PETSc.Vec | None = None  # forces of interfaces before a new pairing
 
@@ -79,7 +66,14 @@ class NewtonModel(TangentModel):
         self.solve(zero)
 
     def move(
-        self, loads: Array, force: Array, at: float, dt: float, *, follow: bool = True
+        self,
+        loads: Array,
+        force: Array,
+        at: float,
+        dt: float,
+        *,
+        follow: bool = True,
+        confirm: bool = True,
     ) -> Equilibrium:
         """Find the equilibrium at other loads and given forces; collective.
 
@@ -92,6 +86,7 @@ class NewtonModel(TangentModel):
             at: Time of the end.
             dt: Time since the accepted state.
             follow: Follow contact and softening on the way; else go straight to the end.
+            confirm: Call :meth:`confirm` as well; else it must be before :meth:`accept`.
 
         Raises:
             ConvergenceError: None was found; the accepted state is in force again.
@@ -120,40 +115,56 @@ class NewtonModel(TangentModel):
         self.counts.residuals = []
         try:
             iterations = newton.solve(problem, y)
-            if iterations and self.condensation.n_negative:
-                raise ConvergenceError(
-                    "the equilibrium found is unstable (buckling, or a limit load was passed); "
-                    "take smaller increments, or control a displacement instead of a force"
-                )
             end = self._end(problem, y, predicted, loads)
         except ConvergenceError:
-            self.counts.failures += 1
-            self.reject(saved)
+            self._fail(saved)
             raise
         finally:
             problem.destroy()
             y.destroy()
         self.counts.solves += 1
         self.counts.iterations += iterations
-        if dynamic or self.bodies.path_dependent:
-            # their terms count by the trapezoidal rule: with the same rule here nothing is lost
-            points, predicted, iterations = [(0.0, here), (1.0, end)], end, 0
-        after = self.system.rates(loads - here.loads, force - here.force) if iterations else rate
-        jump = (end.jump - predicted.jump) / 2.0 - (after[0] - rate[0]) / 12.0
-        conjugate = (end.conjugate - predicted.conjugate) / 2.0 - (after[1] - rate[1]) / 12.0
-        given = force - here.force
-        given[soft] = given[self.system.soft.components] = 0.0
-        way = [*(point for _, point in points), end]
-        bonds = sum(bond_work(a, b) for a, b in pairwise(way))
-        self.last_move = Move(
-            here,
-            end,
-            _along(points, "conjugate") + conjugate,
-            _along(points, "jump") + jump,
-            bonds + float(given @ jump),
-            0.0 if slide is None else slide.energy(self.system, end),
-        )
+        self._trial_drift = problem.drift + (0.0 if problem.renewed else self._drift)
+        friction = 0.0 if slide is None else slide.energy(self.system, end)
+        self._way = Way(saved, points, end, rate, soft, iterations, friction)
+        self.last_move = None
+        if confirm:
+            self.confirm()
         return end
+
+    def _fail(self, saved: Snapshot) -> None:
+        self.counts.failures += 1
+        self.reject(saved)
+
+    def confirm(self) -> None:
+        """Have the tangent of the trial where it counts, and the integrals along the way to it.
+
+        Collective.
+
+        Raises:
+            ConvergenceError: The equilibrium is unstable; the accepted state is in force again.
+        """
+        way = self._way
+        assert way is not None
+        here, end, iterations = way.points[0][1], way.end, way.iterations
+        trapezoidal = self.bodies.dynamic or self.bodies.path_dependent
+        limit = 0.0 if self.exact else np.inf if trapezoidal else _FAR_OFF
+        try:
+            if iterations and self._trial_drift > limit and not self.bodies.constant:
+                self._factor()
+                self._through(end)
+                self._trial_drift = 0.0
+            if self._kept is not None and self.condensation.n_negative:
+                raise NotPositiveDefinite(0)
+        except NotPositiveDefinite as error:
+            self._fail(way.saved)
+            raise ConvergenceError(_UNSTABLE) from error
+        after = way.rate
+        if iterations and not trapezoidal:
+            after = self.system.rates(end.loads - here.loads, end.force - here.force)
+        soft = self.system.soft.components
+        self.last_move = way.integrals(after, soft, trapezoidal=trapezoidal)
+        self._way = None
 
     def _toward(self, predicted: Equilibrium) -> PETSc.Vec:
         """Y of a state on the present tangent."""
@@ -172,9 +183,9 @@ class NewtonModel(TangentModel):
         n = self.system.n_window + len(self.supports.columns)
         borders = self._border_values()
         conjugate = np.concatenate([values[self.system.n_window : n], -borders[: len(self.loads)]])
-        x = np.concatenate([last.jump, loads])
-        target = np.concatenate([values[:n], borders])
-        self.system.renew(self.system.schur, target - self.system.schur[:, : len(x)] @ x)
+        end = Equilibrium(loads, last.force, last.jump, conjugate)
+        self._answers = np.concatenate([values[:n], borders])
+        self._through(end)
         trial = self.coordinates.transform.createVecLeft()
         self.coordinates.transform.mult(y, trial)
         trial.axpy(1.0, self.u)
@@ -182,7 +193,12 @@ class NewtonModel(TangentModel):
             self._trial.destroy()
         self._trial = trial
         self._follow_fronts(trial)
-        return Equilibrium(loads, last.force, last.jump, conjugate)
+        return end
+
+    def _through(self, end: Equilibrium) -> None:
+        """Let the dense system of the tangent at hand pass through the trial's end."""
+        x, schur = np.concatenate([end.jump, end.loads]), self.condensation.schur
+        self.system.renew(schur, self._answers - schur[:, : len(x)] @ x)
 
     def accept(self) -> None:
         """The last trial becomes the accepted state; collective."""
@@ -192,7 +208,8 @@ class NewtonModel(TangentModel):
         self._trial.copy(self.u)
         self.at = self._trial_at
         self.largest_force = max(self.largest_force, self.force_scale)
-        self._moved = False
+        self._drift = self._trial_drift
+        self._keep_tangent()
         self.state = self.last_move.end
         self._base = self.state.jump.copy()
         if self._replaced is not None:
@@ -341,12 +358,16 @@ class NewtonModel(TangentModel):
     def recall(self, saved: Any) -> None:
         """Return to an earlier accepted state; ``state`` is the caller's to set before."""
         states, u, terms, books, (pairs, numbers) = saved
+        here = min(self.comm.allgather(np.array_equal(self.u.array_r, u)))
         self.u.array[:] = u
         self.at, energy = books
         for term, kept in zip(self.bodies.terms, terms, strict=True):
             term.restore(kept)
-        self._moved = True
-        if all(a is b for a, b in zip(pairs, self.pairs, strict=True)):
+        same = all(a is b for a, b in zip(pairs, self.pairs, strict=True))
+        if not (same and here):
+            self._keep_tangent()  # that of a state which is gone as well
+            self._drift = np.inf
+        if same:
             self._base = self.state.jump.copy()
             self.reject(states)
         else:
@@ -361,20 +382,12 @@ class NewtonModel(TangentModel):
 
     def _back(self) -> None:
         """Dense system and bodies at the accepted state again."""
+        self._way = None
         self.bodies.set(self.u)
         self._follow_fronts(self.u)
-        if self._moved or self._condensation is None:
-            self._factor()  # the next prediction and the energies need the tangent of this state
-            self._moved = False
+        self._former_tangent()
+        if self._condensation is None or (self._drift == np.inf and not self.bodies.constant):
+            self._factor()
+            self._keep_tangent()
+        self._drift = min(self._drift, 1.0)
         self.anchor()
-
-
-def _along(points: list[tuple[float, Equilibrium]], name: str) -> Array:
-    """Integral of a quantity over s along linear pieces."""
-    return np.sum(
-        [
-            0.5 * (t - s) * (getattr(a, name) + getattr(b, name))
-            for (s, a), (t, b) in pairwise(points)
-        ],
-        axis=0,
-    )

@@ -31,6 +31,7 @@ def take_bodies(model: NewtonModel) -> Arrays:
         (n_nodes, gdim), and pairing.*[p]; conjugate, shape (n_loads,); dense.*; sums.
     """
     comm = model.comm
+    model.refresh()
     mine = {"partition": _partition(model), **model.bodies.state()}
     out: Arrays = {"ranks": np.array(comm.size)}
     for rank, state in enumerate(comm.gather(mine) or []):

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fxcrack.errors import InputError
+from fxcrack.errors import InputError, SolverError
 from fxcrack.interface.jumps import JumpCoordinates
 from fxcrack.interface.replica import JumpReader
 from fxcrack.interface.sliding import renewed
@@ -32,6 +32,14 @@ Array = npt.NDArray[np.float64]
 
 _FEW_COLUMNS = 256
 """Up to so many last coordinates block solves beat a second factorisation on several ranks."""
+
+
+class _Tangent(NamedTuple):
+    """A condensed tangent, the version of its terms, and how far it is off where it is used."""
+
+    condensation: Condensation
+    version: tuple[int, ...]
+    drift: float
 
 
 class TangentModel(CondensedModel):
@@ -53,6 +61,8 @@ class TangentModel(CondensedModel):
         round_off: Residual that rounding alone may leave there.
         at: Time of the accepted state.
         pairing_energy: Energy that new pairings of faces that slide have taken so far.
+        exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
+            crack closure: it is that of every state then.
     """
 
     linear = False
@@ -74,8 +84,10 @@ class TangentModel(CondensedModel):
         self.coordinates: JumpCoordinates
         self._stiff = 0.0
         self._base = np.zeros(0)
-        self._moved = False  # whether the tangent is that of a trial
+        self._kept: _Tangent | None = None  # the one before a trial that made another
+        self._spare: Condensation | None = None  # whose memory the next tangent takes
         self._version: tuple[int, ...] = ()  # of the terms whose tangent is factored
+        self._drift = 0.0  # how far the tangent at hand is off at the accepted state
         self._current = bodies.finite
         self._masters = [
             gather_surface(continuum, p.interface.master)
@@ -89,6 +101,7 @@ class TangentModel(CondensedModel):
         )
         self.at = 0.0
         self.pairing_energy = 0.0
+        self.exact = False
 
     # -- the window and its tangent ------------------------------------------------------
 
@@ -130,29 +143,67 @@ class TangentModel(CondensedModel):
         assert isinstance(self._condensation, Condensation)
         return self._condensation
 
+    def _choose_window(self) -> JumpCoordinates:
+        self._drop(self._spare)
+        self._spare = None
+        return super()._choose_window()
+
     def _factor(self) -> None:
-        """Condense the tangent at the bodies' present displacement; collective."""
+        """Condense the tangent at the bodies' present displacement; collective.
+
+        The one at hand at the beginning of a trial is kept until the trial is accepted.
+        """
+        free, self._spare = self._spare, None
         if self._condensation is not None:
-            self._condensation.destroy(keep_transform=True)
-            self._condensation = None
+            if self._kept is None:
+                self._kept = _Tangent(self.condensation, self._version, self._drift)
+            else:
+                free = self.condensation
+        self._condensation = None
         method = self.options.method
         if method == "auto" and self.comm.size > 1 and self.coordinates.n_last <= _FEW_COLUMNS:
             method = "columns"
-        matrix = self._stiffness = self.bodies.tangent()
-        if not self.bodies.symmetric:
-            # the interface algebra stands on a symmetric S: its part of the tangent converges too
-            matrix = matrix.copy()
-            transposed = matrix.transpose(PETSc.Mat())
-            matrix.axpy(1.0, transposed)
-            matrix.scale(0.5)
-            transposed.destroy()
-        self._condensation = Condensation(
-            matrix, self.coordinates, self._borders, self.timings, method=method, definite=False
-        )
-        if matrix is not self._stiffness:
-            matrix.destroy()
-        self._version = self.bodies.version
+        matrix, self._stiffness = self.bodies.tangents()
+        try:
+            if free is None:
+                free = Condensation(
+                    matrix, self.coordinates, self._borders, self.timings,
+                    method=method, definite=False, renewable=True,
+                )  # fmt: skip
+            else:
+                free.renew(matrix)
+        except SolverError:
+            self._drop(free)
+            raise
+        self._condensation = free
+        self._version, self._drift = self.bodies.version, 0.0
         self._stiff = float(self._stiffness.norm(PETSc.NormType.NORM_INFINITY))
+
+    def _keep_tangent(self) -> None:
+        """The tangent at hand is the accepted one from now on; collective."""
+        if self._kept is not None:
+            self._spare, self._kept = self._kept.condensation, None
+
+    @staticmethod
+    def _drop(condensation: Condensation | None) -> None:
+        if condensation is not None:
+            condensation.destroy(keep_transform=True)
+
+    def _former_tangent(self) -> None:
+        """Forget tangents made since the last accepted state; collective."""
+        if self._kept is not None:
+            self._spare = self._condensation  # type: ignore[assignment]
+            self._condensation = self._kept.condensation
+            self._version, self._drift = self._kept.version, self._kept.drift
+            self._kept = None
+
+    def refresh(self) -> None:
+        """Have the tangent of the accepted state, whatever is at hand; collective."""
+        if self._drift > 0.0 and not self.bodies.constant:
+            self.bodies.set(self.u)
+            self._factor()
+            self._keep_tangent()
+            self.anchor()
 
     def _anchor(self, residual: PETSc.Vec, jump: Array, loads: Array) -> PETSc.Vec:
         """Offset of the dense system from a residual; returns A_11^-1 r_1."""
@@ -187,6 +238,11 @@ class TangentModel(CondensedModel):
             moved[:, : self.continuum.gdim] += self._reader.slaves(values, pair)
             front.follow(moved)
 
+    @property
+    def follows_sliding(self) -> bool:
+        """Whether open nodes are paired anew where faces slide."""
+        return any(m is not None for m in self._masters)
+
     def renew_pairs(self) -> bool:
         """Pair open nodes with the master surface where it is now; collective.
 
@@ -194,7 +250,7 @@ class TangentModel(CondensedModel):
             Whether a pair has changed; the dense system is then another one, and the caller
             solves for its state (:meth:`solve`).
         """
-        if not any(m is not None for m in self._masters):
+        if not self.follows_sliding:
             return False
         values = self._reader.values.gather(self.u.array_r)
         changed = False
@@ -246,17 +302,29 @@ class TangentModel(CondensedModel):
         self.comm.Bcast(out)
         return out
 
-    def linearise(self, jump: Array, loads: Array, residual: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Dense system of the tangent at the bodies' present displacement.
+    def linearise(
+        self, jump: Array, loads: Array, residual: PETSc.Vec, out: PETSc.Vec, *, anew: bool
+    ) -> bool:
+        """Dense system of the tangent through the bodies' present forces.
 
-        ``out`` becomes A_11^-1 r_1.
+        Args:
+            jump: Jumps there, shape (n_window,).
+            loads: Shape (n_loads,).
+            residual: Forces there, r.
+            out: Becomes A_11^-1 r_1.
+            anew: Make the tangent of the bodies' present displacement; else take the one at hand
+                if the terms' data have not changed since.
+
+        Returns:
+            Whether a tangent was made.
         """
-        if not self.bodies.constant or self._version != self.bodies.version:
+        anew = (anew and not self.bodies.constant) or self._version != self.bodies.version
+        if anew:
             self._factor()
-            self._moved = True
         q = self._anchor(residual, jump, loads)
         q.copy(out)
         q.destroy()
+        return anew
 
     def interface_equilibrium(self, loads: Array, force: Array) -> Equilibrium:
         """Jumps and forces on the present tangent, softening bonds on their right branches."""
@@ -322,7 +390,7 @@ class TangentModel(CondensedModel):
     def spent(self) -> dict[str, float]:
         """Energies the bodies have turned into something else, by name; collective."""
         spent = self.bodies.spent()
-        if any(m is not None for m in self._masters):
+        if self.follows_sliding:
             spent["pairing_energy"] = self.pairing_energy
         return spent
 
@@ -333,6 +401,13 @@ class TangentModel(CondensedModel):
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Accepted displacement; the caller destroys it."""
         return self.u.copy()
+
+    def destroy(self) -> None:
+        """Free all PETSc objects; collective."""
+        self._keep_tangent()
+        self._drop(self._spare)
+        self._spare = None
+        super().destroy()
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them."""

@@ -94,20 +94,40 @@ class SchurFactor:
         self._comm = compat.plain_comm(matrix.getComm().tompi4py())
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, definite)
+        self._n_last, self._definite = n_last, definite
+        self._from_scratch(matrix)
+
+    def renew(self, matrix: PETSc.Mat) -> None:
+        """Factor a matrix with the same nonzero pattern; the analysis of the pattern is kept.
+
+        Raises:
+            SolverError: MUMPS failed; the message says why, and the factor is gone.
+        """
+        self._call("MatCholeskyFactorNumeric", self._factor, _handle(matrix), None)
+        if self._infog(1) in TOO_SMALL:
+            self._from_scratch(matrix)
+        else:
+            self._take()
+
+    def _from_scratch(self, matrix: PETSc.Mat) -> None:
         _, end = matrix.getOwnershipRange()
-        mine = np.arange(end - n_last, end) if self._comm.rank == 0 else np.zeros(0)
+        mine = np.arange(end - self._n_last, end) if self._comm.rank == 0 else np.zeros(0)
         rows = PETSc.IS().createGeneral(mine.astype(PETSc.IntType), comm=PETSc.COMM_SELF)
         for extra in WORKSPACE:
             self._factorise(matrix, rows, extra)
             if self._infog(1) not in TOO_SMALL:
                 break
         rows.destroy()
-        problem = factor_problem(self._infog, self._rinfog, definite=definite)
+        self._take()
+
+    def _take(self) -> None:
+        """Take S and the signs of the pivots out of a new factor."""
+        problem = factor_problem(self._infog, self._rinfog, definite=self._definite)
         self.n_negative = self._infog(12)
         if problem:
             self.destroy()
             raise SolverError(problem)
-        self.schur = self._fetch(n_last)
+        self.schur = self._fetch(self._n_last)
 
     def _factorise(self, matrix: PETSc.Mat, rows: PETSc.IS, extra: int) -> None:
         self.destroy()

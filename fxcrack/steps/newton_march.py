@@ -17,6 +17,8 @@ from fxcrack.steps.march import March
 
 _AT_ONE = 1e-9
 """How near to 1 the criterion must be at an onset."""
+_MANY = 30
+"""Times it is looked for on the way back; round-off of f may keep it farther off than that."""
 _SMALLEST = 1e-6
 """Smallest piece of a way, before it counts as impassable."""
 
@@ -42,6 +44,11 @@ class NewtonMarch(March):
                 "use 'path', which follows the load through its falls at f = 1, or prescribe "
                 "displacements"
             )
+        self.model.exact = any(
+            getattr(c, "method", "") == "closure"
+            for g in self.growths
+            for c in (g.debond.criterion, *g.debond.watch)
+        )
         return super().run()
 
     def _walk(self, target: float, *, upward: bool) -> bool:
@@ -66,32 +73,77 @@ class NewtonMarch(March):
             saved = self.model.system.snapshot()
             here = self.model.state
             try:
-                point = self.model.move(
-                    self.loads_at(guess), self._force_at(guess), guess, guess - begin
-                )
+                point, values = self._try(guess)
+                level = _largest(values)
+                off = level - 1.0 if upward else 1.0 - level
+                crossed = off > _AT_ONE and abs(guess - begin) > _SMALLEST * _AT_ONE * whole
+                if crossed and not self._goes_back:
+                    self.model.reject(saved)
+                    beyond = (guess, level)
+                    continue
+                if not self.model.exact:
+                    self.model.confirm()
             except ConvergenceError as error:
                 size = 0.25 * abs(guess - begin)
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
-            before, self._values = self._values, self._evaluate_at(point, guess)
-            level = max(self._largest())
-            crossed = level > 1.0 + _AT_ONE if upward else level < 1.0 - _AT_ONE
-            if crossed and abs(guess - begin) > _SMALLEST * _AT_ONE * whole:
-                self.model.reject(saved)
-                self._values = before
-                beyond = (guess, level)
-                continue
+            before, self._values = max(self._largest()), values
             self._advance(here, point, guess)
             self.model.accept()
-            if abs(level - 1.0) <= _AT_ONE or crossed:
+            if crossed:
+                self._back_to_one((begin, before))
+                return True
+            if off >= -_AT_ONE:
                 return True
             if guess == target:
                 return False
             if beyond is None:
                 size = min(2.0 * size, self.step.maximum)
                 self._record("increment")
+
+    @property
+    def _goes_back(self) -> bool:
+        """Whether a way back leads through the same equilibria: nothing remembers the way there."""
+        system, bodies = self.model.system, self.model.bodies
+        remembers = bodies.path_dependent or system.soft.bonds or self._ramps
+        return not (remembers or system.friction is not None or self.model.follows_sliding)
+
+    def _try(self, time: float) -> tuple[Equilibrium, list[TipValues]]:
+        """The equilibrium at a time, a trial, and the criteria there."""
+        loads, force = self.loads_at(time), self._force_at(time)
+        point = self.model.move(loads, force, time, time - self.time, confirm=self.model.exact)
+        return point, self._evaluate_at(point, time)
+
+    def _back_to_one(self, other: tuple[float, float]) -> None:
+        """From beyond f = 1 to where it is, along the way that led here.
+
+        Args:
+            other: A time on the other side of it, with the largest f there.
+
+        Raises:
+            TooManyCutbacks: No equilibrium was found.
+        """
+        for _ in range(_MANY):
+            level = max(self._largest())
+            if abs(level - 1.0) <= _AT_ONE:
+                return
+            guess = self._predicted(other[0], upward=other[0] > self.time)
+            if guess == other[0]:
+                guess = self._secant(other, guess)
+            here, begin = self.model.state, (self.time, level)
+            try:
+                point, values = self._try(guess)
+                if not self.model.exact:
+                    self.model.confirm()
+            except ConvergenceError as error:
+                raise TooManyCutbacks(str(error)) from error
+            self._values = values
+            self._advance(here, point, guess)
+            self.model.accept()
+            if (begin[1] - 1.0) * (_largest(values) - 1.0) < 0.0:
+                other = begin
 
     def _predicted(self, target: float, *, upward: bool) -> float:
         """Time before a target at which f reaches 1 on the tangent; the target if it does not."""
@@ -138,3 +190,7 @@ class NewtonMarch(March):
         self._renew()
         loads, force = self.loads_at(target), self._force_at(target)
         return [(1.0, self.model.move(loads, force, target, target - self.time))]
+
+
+def _largest(values: list[TipValues]) -> float:
+    return max((float(v.f.max(initial=0.0)) for v in values), default=0.0)

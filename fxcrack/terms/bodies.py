@@ -47,6 +47,7 @@ class Bodies:
         self._forms: list[tuple[Term, Any, Any]] = []
         self._energies: dict[str, Any] = {}
         self._matrix: PETSc.Mat | None = None
+        self._symmetric: PETSc.Mat | None = None
         self._assembled: tuple[int, ...] | None = None  # version of the terms in the matrix
 
     @property
@@ -147,6 +148,23 @@ class Bodies:
             self._assembled = self.version
         return self._matrix
 
+    def tangents(self) -> tuple[PETSc.Mat, PETSc.Mat]:
+        """The symmetric part of K(u), and K(u); owned by this object.
+
+        The interface algebra stands on a symmetric S; the iteration converges with this part too.
+        """
+        matrix = self.tangent()
+        if self.symmetric:
+            return matrix, matrix
+        transposed = matrix.transpose(PETSc.Mat())
+        if self._symmetric is None:
+            self._symmetric = matrix.duplicate()
+        matrix.copy(self._symmetric)
+        self._symmetric.axpy(1.0, transposed, PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
+        self._symmetric.scale(0.5)
+        transposed.destroy()
+        return self._symmetric, matrix
+
     def stored(self) -> dict[str, float]:
         """Energies stored at the present displacement, by name; collective."""
         self.compile()
@@ -207,6 +225,7 @@ class Bodies:
 
     def destroy(self) -> None:
         """Free PETSc objects; collective."""
-        if self._matrix is not None:
-            self._matrix.destroy()
-            self._matrix = None
+        for matrix in (self._matrix, self._symmetric):
+            if matrix is not None:
+                matrix.destroy()
+        self._matrix = self._symmetric = None

@@ -1,0 +1,107 @@
+"""The way from one equilibrium of nonlinear bodies to another, and what was spent on it.
+
+Between two accepted states the dense system holds the tangent: it predicts the way (contact and
+softening followed exactly on it), SNES corrects the end, and the integrals along the way are those
+of the prediction plus the correction e, whose value and rate are zero at the start:
+
+    int_0^1 e ds = e(1)/2 - e'(1)/12      (cubic in s)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.solve.jump_system import Equilibrium, bond_work
+from fxcrack.solve.linear_jumps import Snapshot
+
+Array = npt.NDArray[np.float64]
+Ints = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Move:
+    """The way from one equilibrium to another, loads and given forces linear in s from 0 to 1.
+
+    Attributes:
+        start: Where it begins.
+        end: Where it ends.
+        conjugate: Integral of the conjugates over s, shape (n_loads,).
+        jump: Integral of the jumps over s, shape (n_window,).
+        bonds: Energy that bonds which are letting go took out on the way.
+        friction: Energy that friction took on the way.
+    """
+
+    start: Equilibrium
+    end: Equilibrium
+    conjugate: Array
+    jump: Array
+    bonds: float
+    friction: float
+
+
+@dataclass(frozen=True)
+class Way:
+    """What is known of a trial before it is confirmed.
+
+    Attributes:
+        saved: The dense system's states before it.
+        points: Pieces of the predicted way with the fraction at which each ends.
+        end: The equilibrium found.
+        rate: Rates of jumps and conjugates at the start, by the tangent there.
+        soft: Components that softened at the start.
+        iterations: Iterations it took.
+        friction: Energy that friction took.
+    """
+
+    saved: Snapshot
+    points: list[tuple[float, Equilibrium]]
+    end: Equilibrium
+    rate: tuple[Array, Array]
+    soft: Ints
+    iterations: int
+    friction: float
+
+    def integrals(self, after: tuple[Array, Array], soft: Ints, *, trapezoidal: bool) -> Move:
+        """What the way took.
+
+        Args:
+            after: Rates of jumps and conjugates at the end, by the tangent there.
+            soft: Components that soften there.
+            trapezoidal: Straight from start to end, for bodies whose terms count so: with the same
+                rule here nothing is lost.
+        """
+        end, points = self.end, self.points
+        here, predicted = points[0][1], points[-1][1]
+        if trapezoidal:
+            points, predicted, after = [(0.0, here), (1.0, end)], end, self.rate
+        given = end.force - here.force
+        given[self.soft] = given[soft] = 0.0
+        jump, conjugate = (
+            (getattr(end, name) - getattr(predicted, name)) / 2.0 - (b - a) / 12.0
+            for name, a, b in zip(("jump", "conjugate"), self.rate, after, strict=True)
+        )
+        states = [*(point for _, point in points), end]
+        bonds = sum(bond_work(a, b) for a, b in pairwise(states))
+        return Move(
+            here,
+            end,
+            _along(points, "conjugate") + conjugate,
+            _along(points, "jump") + jump,
+            bonds + float(given @ jump),
+            self.friction,
+        )
+
+
+def _along(points: list[tuple[float, Equilibrium]], name: str) -> Array:
+    """Integral of a quantity over s along linear pieces."""
+    return np.sum(
+        [
+            0.5 * (t - s) * (getattr(a, name) + getattr(b, name))
+            for (s, a), (t, b) in pairwise(points)
+        ],
+        axis=0,
+    )
