@@ -196,6 +196,8 @@ def test_suite() -> None:
     assert {c.method for c in cases if c.shape == "plane"} == {"schur"}
     assert [c.dofs for c in cases if c.ranks == 2] == [3e4, 3e4, 1.5e5]
     assert sum(c.ahead for c in cases) == 2
+    cases = suite([1e4, 3e4], ["block"], ["schur", "iterative"], [2])  # all of it on two
+    assert [(c.dofs, c.ranks) for c in cases] == [(1e4, 2), (3e4, 2)] * 2
 
 
 @pytest.mark.mpi

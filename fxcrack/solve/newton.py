@@ -20,6 +20,7 @@ from petsc4py import PETSc
 
 from fxcrack.errors import ConvergenceError, SolverError
 from fxcrack.solve.cholesky import NotPositiveDefinite
+from fxcrack.solve.petsc_schur import mumps_message
 
 Array = npt.NDArray[np.float64]
 
@@ -294,6 +295,8 @@ def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
         reason, iterations = int(snes.getConvergedReason()), int(snes.getIterationNumber())
         norm = float(snes.getFunctionNorm())
     except PETSc.Error as error:
+        if isinstance(problem.error, SolverError) and str(problem.error) != mumps_message(-10, 0):
+            raise ConvergenceError(f"nonlinear solve: {problem.error}") from problem.error
         if isinstance(problem.error, NotPositiveDefinite | SolverError):
             raise ConvergenceError(
                 "nonlinear solve: the tangent is not positive definite, so the load step is too "
