@@ -11,6 +11,7 @@ point they are bonded to.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +27,8 @@ _SLIDE = 0.01
 """Part of a facet a node may slide, and angle its normal may turn, before it is paired anew."""
 _NEAR = 0.5
 """Parts of a facet within which a gap may close in the next increment."""
+CHANGING = ("paired", "masters", "weights", "frames", "gap")
+"""What a new pairing changes of a pair."""
 
 
 def renewed(
@@ -72,3 +75,15 @@ def renewed(
     return replace(
         pair, paired=paired, masters=new_masters, weights=weights, frames=frames, gap=gaps
     )
+
+
+def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
+    """:data:`CHANGING` of a pair, masters as nodes of their surface: the same on any ranks."""
+    order = np.argsort(master.dofs)
+    place = order[np.searchsorted(master.dofs[order], pair.masters)]
+    return {name: getattr(pair, name) for name in CHANGING} | {"masters": place}
+
+
+def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray[Any]]) -> Pair:
+    """A pair with what :func:`changing` has said, on any number of ranks."""
+    return replace(pair, **{**known, "masters": master.dofs[known["masters"]]})

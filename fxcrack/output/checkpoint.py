@@ -27,7 +27,7 @@ from fxcrack.output.collective import together
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
-VERSION = 2
+VERSION = 3
 """Changes when a file of an earlier program can no longer be read."""
 
 

@@ -1,45 +1,37 @@
 """The state of nonlinear bodies and their interfaces as arrays, and back; for checkpoints.
 
 What :mod:`fxcrack.solve.state` holds of a linear model is not enough here: displacements and what
-the terms remember decide the forces, and the dense system is that of the last iterate. Fields are
-kept as each rank holds them, so a restart needs the same ranks.
+the terms remember decide the forces, and the dense system is that of the last iterate.
 """
 
 from __future__ import annotations
 
-import hashlib
-
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack import compat
-from fxcrack.errors import InputError
+from fxcrack.interface.sliding import CHANGING, changing, with_changing
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.newton_model import NewtonModel
 
 Arrays = dict[str, npt.NDArray[np.generic]]
-
-_PAIRING = ("paired", "masters", "weights", "frames", "gap")
-"""What changes of a pair where faces slide far."""
 
 
 def take_bodies(model: NewtonModel) -> Arrays:
     """Everything but what :func:`fxcrack.solve.state.take_states` holds; collective.
 
     Returns:
-        On rank 0, bodies.R.* of every rank R; per pair force[p] and index[p], shape
-        (n_nodes, gdim), and pairing.*[p]; conjugate, shape (n_loads,); dense.*; sums.
+        On rank 0, bodies.* of :meth:`Bodies.state`; per pair force[p] and index[p], shape
+        (n_nodes, gdim), and pairing.*[p] where faces slide far; conjugate, shape (n_loads,);
+        dense.*; sums.
     """
-    comm = model.comm
     model.refresh()
-    mine = {"partition": _partition(model), **model.bodies.state()}
-    out: Arrays = {"ranks": np.array(comm.size)}
-    for rank, state in enumerate(comm.gather(mine) or []):
-        out |= {f"bodies.{rank}.{name}": values for name, values in state.items()}
-    for p, (pair, index) in enumerate(zip(model.pairs, model.index, strict=True)):
+    out: Arrays = {f"bodies.{name}": values for name, values in model.bodies.state().items()}
+    for p, index in enumerate(model.index):
         out[f"index[{p}]"] = index
         out[f"force[{p}]"] = np.where(index >= 0, model.state.force[np.maximum(index, 0)], 0.0)
-        out |= {f"pairing.{name}[{p}]": getattr(pair, name) for name in _PAIRING}
+    for p, (pair, master) in enumerate(zip(model.pairs, model.masters, strict=True)):
+        known = {} if master is None else changing(pair, master)
+        out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
     out["conjugate"] = model.state.conjugate
     out |= {f"dense.{name}": values for name, values in model.dense().items()}
     out["sums"] = np.array([model.pairing_energy, model.largest_force])
@@ -52,28 +44,19 @@ def give_bodies(model: NewtonModel, arrays: Arrays, time: float) -> None:
     Collective.
 
     Args:
-        model: The model of the same scene.
+        model: The model of the same scene, on any number of ranks.
         arrays: From :func:`take_bodies`.
         time: Time of the state.
 
     Raises:
-        InputError: The ranks hold other parts of the mesh than when the state was saved.
+        InputError: The mesh has its cells in another order than when the state was saved.
     """
-    comm = model.comm
-    start = f"bodies.{comm.rank}."
-    mine = {k[len(start) :]: v for k, v in arrays.items() if k.startswith(start)}
-    same = int(arrays["ranks"]) == comm.size
-    same = same and np.array_equal(mine["partition"], _partition(model))
-    if not min(comm.allgather(same)):
-        raise InputError(
-            f"the checkpoint is of nonlinear bodies on {int(arrays['ranks'])} ranks, whose fields "
-            f"fit the same ranks and mesh only; this run has {comm.size} ranks, or divides the "
-            f"mesh otherwise. Run on {int(arrays['ranks'])} ranks, or without restart"
-        )
-    for p, pair in enumerate(model.pairs):
-        known = {name: arrays[f"pairing.{name}[{p}]"] for name in _PAIRING}
-        model.pair_as(p, {n: v.astype(getattr(pair, n).dtype) for n, v in known.items()})
-    model.place({name: values.astype(float) for name, values in mine.items()}, time)
+    for p, master in enumerate(model.masters):
+        if master is not None:
+            known = {name: arrays[f"pairing.{name}[{p}]"] for name in CHANGING}
+            model.pairs[p] = with_changing(model.pairs[p], master, known)
+    bodies = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("bodies.")}
+    model.place({name: values.astype(float) for name, values in bodies.items()}, time)
     model.pairing_energy, model.largest_force = (float(x) for x in arrays["sums"])
 
 
@@ -97,16 +80,6 @@ def give_accepted(model: NewtonModel, arrays: Arrays) -> None:
         model.take_dense(
             {name: np.asarray(arrays[f"dense.{name}"], dtype=float) for name in model.dense()}
         )
-
-
-def _partition(model: NewtonModel) -> npt.NDArray[np.uint8]:
-    """Digest of the cells and dofs of this rank."""
-    continuum = model.continuum
-    parts = [compat.original_cell_index(continuum.mesh.domain), continuum.space.dofmap.list]
-    digest = hashlib.sha256()
-    for part in parts:
-        digest.update(np.ascontiguousarray(part, dtype=np.int64).tobytes())
-    return np.frombuffer(digest.digest(), np.uint8)
 
 
 __all__ = ["give_accepted", "give_bodies", "take_bodies"]

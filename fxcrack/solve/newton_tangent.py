@@ -8,7 +8,6 @@ Bodies without their past: moves between equilibria are :mod:`fxcrack.solve.newt
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,6 +60,7 @@ class TangentModel(CondensedModel):
         round_off: Residual that rounding alone may leave there.
         at: Time of the accepted state.
         pairing_energy: Energy that new pairings of faces that slide have taken so far.
+        masters: Per pair the undeformed master surface, ``None`` where pairing is never renewed.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
     """
@@ -89,16 +89,14 @@ class TangentModel(CondensedModel):
         self._version: tuple[int, ...] = ()  # of the terms whose tangent is factored
         self._drift = 0.0  # how far the tangent at hand is off at the accepted state
         self._current = bodies.finite
-        self._masters = [
+        self.masters = [
             gather_surface(continuum, p.interface.master)
             if self._current and p.interface.contact
             else None
             for p in self.pairs
         ]
         self._undeformed = [p.surface.x for p in self.pairs]
-        self._reader = JumpReader(
-            continuum, self.pairs, [m for m in self._masters if m is not None]
-        )
+        self._reader = JumpReader(continuum, self.pairs, [m for m in self.masters if m is not None])
         self.at = 0.0
         self.pairing_energy = 0.0
         self.exact = False
@@ -241,7 +239,7 @@ class TangentModel(CondensedModel):
     @property
     def follows_sliding(self) -> bool:
         """Whether open nodes are paired anew where faces slide."""
-        return any(m is not None for m in self._masters)
+        return any(m is not None for m in self.masters)
 
     def renew_pairs(self) -> bool:
         """Pair open nodes with the master surface where it is now; collective.
@@ -254,7 +252,7 @@ class TangentModel(CondensedModel):
             return False
         values = self._reader.values.gather(self.u.array_r)
         changed = False
-        for p, master in enumerate(self._masters):
+        for p, master in enumerate(self.masters):
             if master is None:
                 continue
             pair = self.pairs[p]
@@ -343,12 +341,8 @@ class TangentModel(CondensedModel):
 
     # -- for checkpoints -----------------------------------------------------------------
 
-    def pair_as(self, p: int, parts: dict[str, Any]) -> None:
-        """Give a pair the masters, weights, frames and gaps of another time."""
-        self.pairs[p] = replace(self.pairs[p], **parts)
-
     def place(self, state: dict[str, Array], time: float) -> None:
-        """Put the bodies into a state from :meth:`Bodies.state` at a time; collective."""
+        """Put the bodies into a state of :meth:`Bodies.state` at a time; collective."""
         if self.continuum.temperature is not None:
             self.continuum.temperature.set(time)
         self.bodies.restore(state)

@@ -15,6 +15,7 @@ import ufl
 from dolfinx import fem
 
 from fxcrack.continuum import Continuum
+from fxcrack.terms.file_order import Place
 
 Array = npt.NDArray[np.float64]
 
@@ -81,7 +82,11 @@ class Term:
         return 0.0
 
     def state(self) -> dict[str, Array]:
-        """Committed state of this rank for a checkpoint; empty where there is none."""
+        """Committed state of this rank; empty where there is none."""
+        return {}
+
+    def places(self) -> dict[str, Place]:
+        """Where the arrays of :meth:`state` live; those not named are the same on all ranks."""
         return {}
 
     def restore(self, state: dict[str, Array]) -> None:
@@ -123,6 +128,10 @@ class StoringTerm(Term):
     def state(self) -> dict[str, Array]:
         """State of the work of the temperature."""
         return {} if self._thermal is None else dict(self._thermal.state())
+
+    def places(self) -> dict[str, Place]:
+        """Where that state lives."""
+        return {} if self._thermal is None else dict(self._thermal.places())
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`."""

@@ -21,9 +21,14 @@ from petsc4py import PETSc
 
 from fxcrack import compat
 from fxcrack.continuum import Continuum
+from fxcrack.errors import InputError
 from fxcrack.terms.base import Term
+from fxcrack.terms.file_order import FileOrder, Place
 
 Array = npt.NDArray[np.float64]
+
+_SAME = 1e-9
+"""Nodes of another number of ranks may be off by round-off, in parts of the largest coordinate."""
 
 
 class Bodies:
@@ -41,6 +46,7 @@ class Bodies:
     def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
         self.continuum = continuum
         self.terms = list(terms)
+        self._order = FileOrder(continuum.mesh.domain)
         self.u = fem.Function(continuum.space, name="displacement")
         self.seconds: dict[str, float] = {}
         # one residual and one tangent per term, so that the cost of each can be told
@@ -209,19 +215,60 @@ class Bodies:
             self._add(term.name, start)
 
     def state(self) -> dict[str, Array]:
-        """Committed state of this rank: the displacement and what the terms remember."""
-        out = {"displacement": self.u.x.array.copy()}
+        """Committed state: positions, displacement and what the terms remember; collective.
+
+        Returns:
+            On rank 0, fields in the order of :class:`FileOrder`.
+        """
+        places = self._places()
+        return {
+            name: self._order.gather(values, places[name]) if name in places else values
+            for name, values in self._local().items()
+        }
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state` of the same mesh and terms; collective.
+
+        Args:
+            state: The same on all ranks, of any number of ranks.
+
+        Raises:
+            InputError: Cells or their nodes have another order than they had.
+        """
+        places, local = self._places(), self._local()
+        mine = {
+            name: self._order.scatter(values, places[name]).reshape(local[name].shape)
+            if name in places
+            else values
+            for name, values in state.items()
+        }
+        x = local["positions"]
+        size = np.abs(x).max(initial=0.0)
+        same = bool(np.abs(mine["positions"] - x).max(initial=0.0) <= _SAME * size)
+        if not min(self.continuum.comm.allgather(same)):
+            raise InputError(
+                "the checkpoint does not fit: its mesh has the same cells in another order, or "
+                "nodes elsewhere. Give the mesh it was written with, or run without restart"
+            )
+        self.u.x.array[:] = mine["displacement"]
+        for i, term in enumerate(self.terms):
+            start = f"{i}."
+            term.restore({k[len(start) :]: v for k, v in mine.items() if k.startswith(start)})
+            term.update(self.u)
+
+    def _local(self) -> dict[str, Array]:
+        """The parts of :meth:`state` on this rank."""
+        out = {"positions": self.continuum.positions(), "displacement": self.u.x.array}
         for i, term in enumerate(self.terms):
             out |= {f"{i}.{key}": value for key, value in term.state().items()}
         return out
 
-    def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state` of the same mesh, ranks and terms."""
-        self.u.x.array[:] = state["displacement"]
+    def _places(self) -> dict[str, Place]:
+        """Where they live, but for those that are the same on all ranks."""
+        out: dict[str, Place] = dict.fromkeys(("positions", "displacement"), self.continuum.space)
         for i, term in enumerate(self.terms):
-            start = f"{i}."
-            term.restore({k[len(start) :]: v for k, v in state.items() if k.startswith(start)})
-            term.update(self.u)
+            out |= {f"{i}.{key}": place for key, place in term.places().items()}
+        return out
 
     def destroy(self) -> None:
         """Free PETSc objects; collective."""

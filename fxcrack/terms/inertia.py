@@ -25,6 +25,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.errors import InputError, SolverError
 from fxcrack.inertia import Inertia
 from fxcrack.terms.base import Term
+from fxcrack.terms.file_order import Place
 
 Array = npt.NDArray[np.float64]
 
@@ -236,6 +237,10 @@ class InertiaForces(Term):
         """Motion of the last commit and sums."""
         out = {name: value.copy() for name, value in self._last.items()}
         return out | {"sums": np.array(list(self._spent.values())), "dt": np.array([self._dt])}
+
+    def places(self) -> dict[str, Place]:
+        """Space of the motion."""
+        return dict.fromkeys(REMEMBERED, self._continuum.space)
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`, with the tangent of its last increment."""

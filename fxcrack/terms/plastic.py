@@ -25,6 +25,7 @@ from fxcrack.errors import InputError
 from fxcrack.models import Axisymmetric, PlaneStress
 from fxcrack.nonlinear_materials import Plastic
 from fxcrack.terms.base import Term, parts_of
+from fxcrack.terms.file_order import Place
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int32]
@@ -190,6 +191,10 @@ class Plasticity(Term):
         for i, p in enumerate(self._points):
             out |= {f"{i}.{key}": value.copy() for key, value in p.committed().items()}
         return out
+
+    def places(self) -> dict[str, Place]:
+        """Cells whose points the arrays belong to."""
+        return {f"{i}.{key}": p.cells for i, p in enumerate(self._points) for key in p.committed()}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`."""

@@ -20,6 +20,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.loads import Pressure
 from fxcrack.models import Axisymmetric
 from fxcrack.terms.base import Term
+from fxcrack.terms.file_order import Place
 from fxcrack.terms.kinematics import cofactor
 
 Array = npt.NDArray[np.float64]
@@ -93,6 +94,10 @@ class FollowerPressure(Term):
     def state(self) -> dict[str, Array]:
         """Displacement and pressure of the last commit, work so far."""
         return {"last": self._last.copy(), "sums": np.array([self._last_factor, self._work])}
+
+    def places(self) -> dict[str, Place]:
+        """Space of the displacement."""
+        return {"last": self._continuum.space}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`."""

@@ -20,6 +20,7 @@ from mpi4py import MPI
 
 from fxcrack.continuum import Continuum
 from fxcrack.temperature import ByTemperature
+from fxcrack.terms.file_order import Place
 
 Array = npt.NDArray[np.float64]
 
@@ -83,6 +84,10 @@ class ThermalWork:
             "rise": self._last_rise.copy(),
             "work": np.array([self.work]),
         }
+
+    def places(self) -> dict[str, Place]:
+        """Spaces of displacement and temperature."""
+        return {"last": self._continuum.space, "rise": self._field.rise.function_space}
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`."""
