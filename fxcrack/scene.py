@@ -190,7 +190,7 @@ class Scene:
             save: File (.csv or .json) that holds the history while the step runs.
             checkpoint: Where and how often the state is saved.
             restart: Go on from the checkpoint if there is one; with the same scene and step, on
-                any number of ranks (nonlinear bodies: on the same number).
+                any number of ranks.
 
         Raises:
             AccuracyError: The accuracy is not reached, or cannot be judged; says what would reach
