@@ -7,7 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from specimens import PINS, dcb, gathered_vector, grow_to, largest_imbalance, onsets, specimen
+from specimens import (
+    HELD_FAR,
+    PINS,
+    dcb,
+    gathered_vector,
+    grow_to,
+    largest_imbalance,
+    onsets,
+    specimen,
+)
 
 import fxcrack as fx
 from fxcrack.effects import FiniteStrain
@@ -168,3 +177,29 @@ def test_condensing_again_is_condensing_anew(
     anew.destroy(keep_transform=True)
     poor.destroy()
     scene.close()
+
+
+@pytest.mark.parametrize("reuse", [True, False])
+def test_whole_steps_bend_a_slender_strip(reuse: bool) -> None:
+    """Bisshopp and Drucker (1945): P L^2/(E I) = 5 bends a cantilever's end by 0.7138 of L."""
+    length, height, modulus = 10.0, 0.1, 70e3 / (1.0 - 0.3**2)
+    mesh = dcb_2d(length=11.0, height=height, dx=0.25, ny=1, order=2)
+    force = 5.0 * modulus * height**3 / 12.0 / length**2
+    scene = specimen(
+        mesh,
+        a0=length,
+        criterion=fx.VCCT(GIc=1e3),
+        supports=HELD_FAR,
+        loads=[
+            fx.PointForce("pin_top", (0.0, force)),
+            fx.PointForce("pin_bottom", (0.0, -force)),
+        ],
+        monitors=[fx.Monitor("pin_top", (0.0, 1.0), name="end")],
+        effects=[FiniteStrain()],
+        newton=fx.NewtonOptions(reuse=reuse),
+    )
+    history = scene.run(fx.Static(until=fx.Time(1.0)))
+    assert history["m[end]"][-1] == pytest.approx(0.7138 * length, rel=0.01)
+    counts = scene.model.counts
+    assert counts.failures == 0
+    assert counts.iterations < 40

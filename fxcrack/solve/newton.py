@@ -31,6 +31,11 @@ _SLOW = 0.3
 """A tangent that leaves more of the residual than this is not used again."""
 _MANY = 2
 """Nor one that would need more steps than this: they cost as much as a new one or more."""
+_CRAWLS = 0.9
+"""A shortened step that leaves more of the residual than this makes way for whole ones: in slender
+bodies they lead through larger residuals (of stretching) to the end (of bending)."""
+_ASTRAY = 10.0
+"""Whole steps have lost their way where the residual is this many times the first one."""
 
 REASONS = {
     -1: "the function left its domain",
@@ -114,7 +119,8 @@ class InterfaceProblem:
         """What a callback raised; PETSc passes on an error code only."""
         self._last: tuple[PETSc.Vec, PETSc.Vec, Array, Array] | None = None
         self._residual: PETSc.Vec | None = None
-        self._norms: list[float] = []
+        self.norms: list[float] = []
+        """Residuals so far, force."""
         self._level = 0.0  # the norm at which the iteration ends
         self._steps_since = 0  # with the present tangent
         self.drift = 0.0
@@ -122,19 +128,23 @@ class InterfaceProblem:
         self.renewed = False
         """Whether a tangent was made on the way."""
         self._reused = 0
+        self.whole = False
+        """Whether steps are taken whole, whatever the residual does meanwhile."""
+        self.patient = False
+        """Whether slow progress of shortened steps is put up with."""
 
     def _worn(self) -> bool:
         """Whether a new tangent comes cheaper than going on with the present one."""
         if not self.model.newton.reuse:
             return True
         if self._steps_since == 0:
-            return self._norms[-1] > _NEAR * self.scale
-        rate = self._norms[-1] / self._norms[-2]
+            return self.norms[-1] > _NEAR * self.scale
+        rate = self.norms[-1] / self.norms[-2]
         if self.fraction != 1.0 or rate >= _SLOW:
             return True
         if not self.model.bodies.symmetric:
             return False  # S is that of the symmetric part: another one is no better
-        return float(np.log(self._level / self._norms[-1])) < _MANY * float(np.log(rate))
+        return float(np.log(self._level / self.norms[-1])) < _MANY * float(np.log(rate))
 
     def residual(self, snes: Any, y: PETSc.Vec, out: PETSc.Vec) -> None:
         """T^t r(u) minus the interface forces that belong to y."""
@@ -181,7 +191,7 @@ class InterfaceProblem:
         jump = model.jumps_of(y)
         if model.linearise(jump, self.loads, self._residual, out, anew=self._worn()):
             self.renewed, self._steps_since = True, 0
-            self.drift = self._norms[-1] / self.scale
+            self.drift = self.norms[-1] / self.scale
         else:
             self._reused += 1
         self._steps_since += 1
@@ -210,7 +220,7 @@ class InterfaceProblem:
         level = max(
             self.model.newton.tolerance * max(self.scale, forces), self.model.round_off, round_off
         )
-        self._norms.append(norm)
+        self.norms.append(norm)
         self._level = level
         if its == 0:
             self.drift = norm / self.scale if norm > level else 0.0
@@ -218,7 +228,25 @@ class InterfaceProblem:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
         if its - self._reused >= self.model.newton.max_iterations:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)
+        if self.whole:
+            astray = norm > _ASTRAY * self.norms[0]
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL) if astray else 0
+        slow = its > 0 and self.fraction != 1.0 and norm > _CRAWLS * self.norms[-2]
+        if slow and not self.patient:
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)
         return 0
+
+    def again(self, known: Array, *, whole: bool) -> None:
+        """Be ready for another run of SNES from the iterate at which the last one got nowhere.
+
+        Args:
+            known: Interface forces there, shape (n_window,).
+            whole: Take whole steps; else shortened ones, however slow.
+        """
+        self.whole, self.patient, self._reused = whole, not whole, 0
+        self.known, self.error = known.copy(), None
+        self.destroy()
+        self._last = self._residual = None
 
     def destroy(self) -> None:
         """Free vectors; collective."""
@@ -259,6 +287,9 @@ class _StepSolver:
 def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
     """Drive SNES from an initial y to equilibrium; collective.
 
+    Steps are shortened where the residual would grow. Where that gets nowhere whole ones are tried,
+    and if they fail shortened ones after all.
+
     Args:
         problem: Residual, step and convergence test.
         y: Initial guess; the solution on return.
@@ -269,12 +300,46 @@ def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
     Raises:
         ConvergenceError: It did not get there; the message carries SNES' reason in words.
     """
+    iterations, reason = _drive(problem, y)
+    if reason != PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH:
+        return _found(problem, iterations, reason)
+    begin, known = y.copy(), problem.known.copy()
+    try:
+        problem.again(known, whole=True)
+        more, reason = _drive(problem, y)
+        return _found(problem, iterations + more, reason)
+    except ConvergenceError:
+        begin.copy(y)
+        problem.again(known, whole=False)
+        more, reason = _drive(problem, y)
+        return _found(problem, iterations + more, reason)
+    finally:
+        begin.destroy()
+
+
+def _found(problem: InterfaceProblem, iterations: int, reason: int) -> int:
+    """Number of iterations, if SNES' reason to end is a good one."""
+    if reason <= 0:
+        words, norm = REASONS.get(reason, f"SNES reason {reason}"), problem.norms[-1]
+        raise ConvergenceError(
+            f"nonlinear solve: {words} (iteration {iterations}, residual {norm:.2e} beside forces "
+            f"of {problem.scale:.2e}); take smaller increments (maximum=, minimum=)"
+        )
+    return iterations
+
+
+def _drive(problem: InterfaceProblem, y: PETSc.Vec) -> tuple[int, int]:
+    """Run SNES once; returns its number of iterations and its reason to end."""
     comm = y.getComm()
     merit, stepper = _MeritOperator(), _StepSolver(problem)
     operator = PETSc.Mat().createPython((y.getSizes(), y.getSizes()), merit, comm=comm)
     operator.setUp()
     snes = PETSc.SNES().create(comm)
-    snes.setOptionsPrefix("fxcrack_newton_")
+    prefix = "fxcrack_newton_"
+    if problem.whole:
+        prefix += "whole_"
+        PETSc.Options(prefix).setValue("snes_linesearch_type", "basic")
+    snes.setOptionsPrefix(prefix)
     work = y.duplicate()
     snes.setFunction(problem.residual, work)
 
@@ -292,8 +357,7 @@ def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
     snes.setFromOptions()
     try:
         snes.solve(None, y)
-        reason, iterations = int(snes.getConvergedReason()), int(snes.getIterationNumber())
-        norm = float(snes.getFunctionNorm())
+        return int(snes.getIterationNumber()), int(snes.getConvergedReason())
     except PETSc.Error as error:
         if isinstance(problem.error, SolverError) and str(problem.error) != mumps_message(-10, 0):
             raise ConvergenceError(f"nonlinear solve: {problem.error}") from problem.error
@@ -308,13 +372,6 @@ def solve(problem: InterfaceProblem, y: PETSc.Vec) -> int:
         snes.destroy()
         operator.destroy()
         work.destroy()
-    if reason <= 0:
-        words = REASONS.get(reason, f"SNES reason {reason}")
-        raise ConvergenceError(
-            f"nonlinear solve: {words} (iteration {iterations}, residual {norm:.2e} beside forces "
-            f"of {problem.scale:.2e}); take smaller increments (maximum=, minimum=)"
-        )
-    return iterations
 
 
 __all__ = ["ConvergenceError", "InterfaceProblem", "NewtonOptions", "SolverError", "solve"]
