@@ -23,6 +23,8 @@ from fxcrack.mesh.raw import place
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Bools = npt.NDArray[np.bool_]
+_FACING = -0.5
+"""Cosine between the outward normals of two surfaces that face each other, at most."""
 Bonded = str | Callable[[Array], Array] | Array | None
 
 
@@ -32,7 +34,9 @@ class Interface:
 
     Args:
         slave: Facet group of the slave side.
-        master: Facet group of the master side; must extend under every bonded slave node.
+        master: Facet group of the master side; must extend under every bonded slave node. Where
+            the interface ends inside a body both sides share the nodes of that border, which stay
+            bonded.
         bonded: The initially bonded slave nodes: the name of a group, a function of positions of
             shape (3, n) that returns n booleans, an array of booleans per slave node (in the
             order of ``Pair.surface``), or ``None``: all of them, and no tip exists.
@@ -110,7 +114,8 @@ class Pair:
     Attributes:
         interface: What the user asked for.
         surface: Slave surface; its node numbers are the slave node numbers.
-        paired: Slave nodes that have a master point, shape (n_nodes,).
+        paired: Slave nodes that have a master point, shape (n_nodes,); not the nodes of a border
+            inside a body, which belong to both sides.
         masters: Global displacement nodes of the masters, shape (n_nodes, k).
         weights: Their weights, shape (n_nodes, k).
         frames: Columns n, t1, t2 (n, t in 2-D), shape (n_nodes, gdim, gdim).
@@ -237,29 +242,48 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
     return marks.astype(bool)
 
 
+def grown_together(slave: FacetSurface, master: FacetSurface, where: str) -> Bools:
+    """Slave nodes that are master nodes as well, shape (n_slave,).
+
+    An interface that ends inside a body has such nodes along its border, where its two sides face
+    each other as everywhere; they are bonded for good and no crack passes them.
+
+    Raises:
+        InterfaceError: The surfaces share nodes but do not face each other there.
+    """
+    _, mine, others = np.intersect1d(slave.dofs, master.dofs, return_indices=True)
+    facing = np.einsum("nc,nc->n", slave.normals[mine], master.normals[others]) < _FACING
+    if not np.all(facing) or len(mine) == slave.n_nodes:
+        raise InterfaceError(
+            f"{where}: surfaces '{slave.name}' and '{master.name}' share {len(mine)} nodes; the "
+            "two sides need nodes of their own (split the mesh there, fxcrack.Split); only where "
+            "an interface ends inside a body may its sides, face to face, share the nodes of "
+            "that border"
+        )
+    grown = np.zeros(slave.n_nodes, dtype=bool)
+    grown[mine] = True
+    return grown
+
+
 def make_pair(continuum: Continuum, interface: Interface) -> Pair:
     """Pair slave and master surface; collective, the same result on every rank.
 
     Raises:
         InterfaceError: A bonded slave node lies outside the master surface, the two surfaces
-            share nodes, or the bonded set does not fit.
+            share nodes other than those of a border inside the body, or the bonded set does not
+            fit.
     """
     slave = gather_surface(continuum, interface.slave)
     master = gather_surface(continuum, interface.master)
     where = f"interface '{interface.title}'"
-    shared = np.intersect1d(slave.dofs, master.dofs)
-    if len(shared):
-        raise InterfaceError(
-            f"{where}: surfaces '{interface.slave}' and '{interface.master}' share {len(shared)} "
-            "nodes; the two sides need nodes of their own (split the mesh there, fxcrack.Split)"
-        )
-    bonded = bonded_nodes(interface, slave, continuum)
+    grown = grown_together(slave, master, where)
+    bonded = bonded_nodes(interface, slave, continuum) | grown
     foot = project(slave.x, master)
     tolerance = interface.tolerance
     if tolerance is None:
         tolerance = 0.1 * master.facet_size
-    paired = foot.distance <= tolerance
-    lost = bonded & ~paired
+    paired = (foot.distance <= tolerance) & ~grown
+    lost = bonded & ~paired & ~grown
     if np.any(lost):
         i = int(np.argmax(np.where(lost, foot.distance, -1.0)))
         raise InterfaceError(

@@ -162,8 +162,8 @@ class WindowModel:
         coordinates = self._choose_window()
         self.frames, self.index = coordinates.frames, coordinates.index
         self.held_by_supports = coordinates.held
-        for front, held in zip(self.fronts, coordinates.held, strict=True):
-            front.tied = held.all(axis=1)
+        for pair, front, held in zip(self.pairs, self.fronts, coordinates.held, strict=True):
+            front.tied = held.all(axis=1) | (pair.bonded & ~pair.paired)
         self._condense(coordinates)
         self.system.seconds, self.system.soft.counts = self.law_seconds, self.soft_counts
         start = time.perf_counter()
