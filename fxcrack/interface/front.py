@@ -52,6 +52,7 @@ class Front:
         self.title = title
         self.bonded = bonded.copy()
         self.version = 0
+        self.placed = 0
         self.tied = np.zeros(surface.n_nodes, dtype=bool)
         self._cache: dict[int, Tip | None] = {}
         facets = surface.facets
@@ -143,6 +144,7 @@ class Front:
             x: Shape (n_nodes, 3), length.
         """
         self.surface = self.surface.moved(x)
+        self.placed += 1
         self._cache.clear()
 
     def release(self, nodes: Ints) -> None:

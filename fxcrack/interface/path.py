@@ -5,7 +5,8 @@ line most nearly along the growth direction; each step counts with its component
 
     s_(k+1) = s_k + (x_(k+1) - x_k) . t_k,    t_k the direction in the tangent plane at node k,
 
-so that a zig-zag line is as long as the straight one it follows. Reference positions are used.
+so that a zig-zag line is as long as the straight one it follows. Positions are those of the front:
+the current ones where bodies move far.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import numpy.typing as npt
 
 from fxcrack.interface.front import Front
 from fxcrack.interface.projection import project
+from fxcrack.interface.surface import FacetSurface
 from fxcrack.interface.tip import Tips
 
 Array = npt.NDArray[np.float64]
@@ -83,19 +85,21 @@ class SurfacePaths:
 
     def __init__(self, front: Front) -> None:
         self._front = front
-        self._surface = front.surface
         self._was_bonded = front.bonded.copy()
         self.initial = front.candidates()
         corner = self._surface.x[self._surface.facets[:, : self._surface.n_corners]]
         between = np.linalg.norm(corner[:, :, None] - corner[:, None], axis=-1)
         self.longest = float(between.max())
-        normals = self._surface.normals
-        self._flat = bool(np.abs(normals - normals[0]).max() < 1e-9)
         self._pieces = self._initial_pieces() if self._surface.dim == 2 else np.zeros((0, 2), int)
         n = self._surface.n_nodes
         self._origin = np.zeros((n, 2), dtype=np.int64)
         self._weights = np.zeros((n, 2))
         self._grown = np.full(n, np.nan)
+
+    @property
+    def _surface(self) -> FacetSurface:
+        """The slave surface where it is now."""
+        return self._front.surface
 
     def ahead(self, tips: Tips, i: int, reach: float) -> Way:
         """Way over bonded nodes ahead of a tip, until it is ``reach`` long or no node follows.
@@ -169,7 +173,8 @@ class SurfacePaths:
     def _laid(self, start: Array, end: Array) -> float:
         """Length of the straight way between two points laid on the surface."""
         straight = float(np.linalg.norm(end - start))
-        if self._flat or straight == 0.0:
+        normals = self._surface.normals
+        if straight == 0.0 or np.abs(normals - normals[0]).max() < 1e-9:
             return straight
         steps = 4 * math.ceil(straight / self.longest)
         way = start + np.linspace(0.0, 1.0, steps + 1)[:, None] * (end - start)

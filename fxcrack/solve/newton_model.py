@@ -124,7 +124,7 @@ class NewtonModel(TangentModel):
             y.destroy()
         self.counts.solves += 1
         self.counts.iterations += iterations
-        self._trial_drift = problem.drift + (0.0 if problem.renewed else self._drift)
+        self._trial_drift = problem.drift + (0.0 if problem.renewed else self.drift)
         friction = 0.0 if slide is None else slide.energy(self.system, end)
         self._way = Way(saved, points, end, rate, soft, iterations, friction)
         self.last_move = None
@@ -208,7 +208,7 @@ class NewtonModel(TangentModel):
         self._trial.copy(self.u)
         self.at = self._trial_at
         self.largest_force = max(self.largest_force, self.force_scale)
-        self._drift = self._trial_drift
+        self.drift = self._trial_drift
         self._keep_tangent()
         self.state = self.last_move.end
         self._base = self.state.jump.copy()
@@ -366,7 +366,7 @@ class NewtonModel(TangentModel):
         same = all(a is b for a, b in zip(pairs, self.pairs, strict=True))
         if not (same and here):
             self._keep_tangent()  # that of a state which is gone as well
-            self._drift = np.inf
+            self.drift = np.inf
         if same:
             self._base = self.state.jump.copy()
             self.reject(states)
@@ -386,8 +386,8 @@ class NewtonModel(TangentModel):
         self.bodies.set(self.u)
         self._follow_fronts(self.u)
         self._former_tangent()
-        if self._condensation is None or (self._drift == np.inf and not self.bodies.constant):
+        if self._condensation is None or (self.drift == np.inf and not self.bodies.constant):
             self._factor()
             self._keep_tangent()
-        self._drift = min(self._drift, 1.0)
+        self.drift = min(self.drift, 1.0)
         self.anchor()

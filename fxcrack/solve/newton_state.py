@@ -24,7 +24,6 @@ def take_bodies(model: NewtonModel) -> Arrays:
         (n_nodes, gdim), and pairing.*[p] where faces slide far; conjugate, shape (n_loads,);
         dense.*; sums.
     """
-    model.refresh()
     out: Arrays = {f"bodies.{name}": values for name, values in model.bodies.state().items()}
     for p, index in enumerate(model.index):
         out[f"index[{p}]"] = index
@@ -34,7 +33,7 @@ def take_bodies(model: NewtonModel) -> Arrays:
         out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
     out["conjugate"] = model.state.conjugate
     out |= {f"dense.{name}": values for name, values in model.dense().items()}
-    out["sums"] = np.array([model.pairing_energy, model.largest_force])
+    out["sums"] = np.array([model.pairing_energy, model.largest_force, model.drift])
     return out
 
 
@@ -57,7 +56,7 @@ def give_bodies(model: NewtonModel, arrays: Arrays, time: float) -> None:
             model.pairs[p] = with_changing(model.pairs[p], master, known)
     bodies = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("bodies.")}
     model.place({name: values.astype(float) for name, values in bodies.items()}, time)
-    model.pairing_energy, model.largest_force = (float(x) for x in arrays["sums"])
+    model.pairing_energy, model.largest_force, _ = (float(x) for x in arrays["sums"])
 
 
 def give_accepted(model: NewtonModel, arrays: Arrays) -> None:
@@ -80,6 +79,7 @@ def give_accepted(model: NewtonModel, arrays: Arrays) -> None:
         model.take_dense(
             {name: np.asarray(arrays[f"dense.{name}"], dtype=float) for name in model.dense()}
         )
+        model.drift = float(arrays["sums"][2])
 
 
 __all__ = ["give_accepted", "give_bodies", "take_bodies"]

@@ -61,6 +61,8 @@ class TangentModel(CondensedModel):
         at: Time of the accepted state.
         pairing_energy: Energy that new pairings of faces that slide have taken so far.
         masters: Per pair the undeformed master surface, ``None`` where pairing is never renewed.
+        drift: How far the tangent at hand is off at the accepted state: what was out of balance
+            where it was made, over the forces.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
     """
@@ -87,7 +89,7 @@ class TangentModel(CondensedModel):
         self._kept: _Tangent | None = None  # the one before a trial that made another
         self._spare: Condensation | None = None  # whose memory the next tangent takes
         self._version: tuple[int, ...] = ()  # of the terms whose tangent is factored
-        self._drift = 0.0  # how far the tangent at hand is off at the accepted state
+        self.drift = 0.0
         self._current = bodies.finite
         self.masters = [
             gather_surface(continuum, p.interface.master)
@@ -113,7 +115,7 @@ class TangentModel(CondensedModel):
         start = time.perf_counter()
         self.bodies.set(self.u)
         self._stiffness = self.bodies.tangent()
-        self._borders = border_vectors(self.continuum, self.loads, self.monitors)
+        self._borders = border_vectors(self.continuum, self.loads, self.monitors, self._followed)
         self.timings.add("assemble", start)
 
     def _condense(self, coordinates: JumpCoordinates) -> None:
@@ -123,13 +125,8 @@ class TangentModel(CondensedModel):
         loads = self.state.loads if hasattr(self, "state") else np.zeros(n_loads)
         self.bodies.set(self.u)
         self._factor()
-        self.system = JumpSystem(
-            self.condensation.schur,
-            n_window,
-            n_loads,
-            len(self.loads),
-            offset=np.zeros(coordinates.n_last),
-        )
+        schur, offset = self.condensation.schur, np.zeros(coordinates.n_last)
+        self.system = JumpSystem(schur, n_window, n_loads, len(self.loads), offset=offset)
         residual = self._out_of_balance(loads)
         self._anchor(residual, self._base, loads)
         residual.destroy()
@@ -142,8 +139,7 @@ class TangentModel(CondensedModel):
         return self._condensation
 
     def _choose_window(self) -> JumpCoordinates:
-        self._drop(self._spare)
-        self._spare = None
+        self._drop_spare()
         return super()._choose_window()
 
     def _factor(self) -> None:
@@ -154,7 +150,7 @@ class TangentModel(CondensedModel):
         free, self._spare = self._spare, None
         if self._condensation is not None:
             if self._kept is None:
-                self._kept = _Tangent(self.condensation, self._version, self._drift)
+                self._kept = _Tangent(self.condensation, self._version, self.drift)
             else:
                 free = self.condensation
         self._condensation = None
@@ -171,37 +167,30 @@ class TangentModel(CondensedModel):
             else:
                 free.renew(matrix)
         except SolverError:
-            self._drop(free)
+            self._spare = free
+            self._drop_spare()
             raise
         self._condensation = free
-        self._version, self._drift = self.bodies.version, 0.0
+        self._version, self.drift = self.bodies.version, 0.0
         self._stiff = float(self._stiffness.norm(PETSc.NormType.NORM_INFINITY))
+
+    def _drop_spare(self) -> None:
+        if self._spare is not None:
+            self._spare.destroy(keep_transform=True)
+            self._spare = None
 
     def _keep_tangent(self) -> None:
         """The tangent at hand is the accepted one from now on; collective."""
         if self._kept is not None:
             self._spare, self._kept = self._kept.condensation, None
 
-    @staticmethod
-    def _drop(condensation: Condensation | None) -> None:
-        if condensation is not None:
-            condensation.destroy(keep_transform=True)
-
     def _former_tangent(self) -> None:
         """Forget tangents made since the last accepted state; collective."""
         if self._kept is not None:
             self._spare = self._condensation  # type: ignore[assignment]
             self._condensation = self._kept.condensation
-            self._version, self._drift = self._kept.version, self._kept.drift
+            self._version, self.drift = self._kept.version, self._kept.drift
             self._kept = None
-
-    def refresh(self) -> None:
-        """Have the tangent of the accepted state, whatever is at hand; collective."""
-        if self._drift > 0.0 and not self.bodies.constant:
-            self.bodies.set(self.u)
-            self._factor()
-            self._keep_tangent()
-            self.anchor()
 
     def _anchor(self, residual: PETSc.Vec, jump: Array, loads: Array) -> PETSc.Vec:
         """Offset of the dense system from a residual; returns A_11^-1 r_1."""
@@ -399,8 +388,7 @@ class TangentModel(CondensedModel):
     def destroy(self) -> None:
         """Free all PETSc objects; collective."""
         self._keep_tangent()
-        self._drop(self._spare)
-        self._spare = None
+        self._drop_spare()
         super().destroy()
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:

@@ -81,11 +81,14 @@ class _AtDistance:
         self.front = model.fronts[p]
         self.surface = self.front.surface
         self.paths = SurfacePaths(self.front)
-        self._known: dict[tuple[int, bytes], Stencil] = {}
+        self._known: dict[tuple[int, int, bytes], Stencil] = {}
+
+    def _key(self, tips: Tips) -> tuple[int, int, bytes]:
+        return self.front.version, self.front.placed, tips.node.tobytes()
 
     def stencil(self, tips: Tips) -> Stencil:
-        """Stencil of the tips, found anew when the front has moved."""
-        key = (self.front.version, tips.node.tobytes())
+        """Stencil of the tips, found anew when the front or the bodies have moved."""
+        key = self._key(tips)
         if key not in self._known:
             parts = [self._part(tips, i) for i in range(len(tips))]
             self._known = {key: Stencil.of(parts, self.surface.order)}
@@ -249,8 +252,7 @@ class OpeningEvaluator(_AtDistance):
 
     def stencil(self, tips: Tips) -> Stencil:
         """Stencil of the tips; the lengths they have grown are found with it."""
-        key = (self.front.version, tips.node.tobytes())
-        if key not in self._known:
+        if self._key(tips) not in self._known:
             self._grown[tips.node] = self.paths.origins(tips).grown
         return super().stencil(tips)
 
@@ -260,7 +262,10 @@ class OpeningEvaluator(_AtDistance):
         pair = self.model.pairs[self.p]
         jump = self.model.vectors(self.p, stencil.nodes, state.jump)
         normal = np.zeros((*stencil.nodes.shape, 3))
-        normal[..., : self.model.continuum.gdim] = pair.frames[stencil.nodes, :, 0]
+        if self.front.placed:  # the arms turn to both sides of the normal at the tip
+            normal[:] = tips.frame[:, None, :, 0]
+        else:
+            normal[..., : self.model.continuum.gdim] = pair.frames[stencil.nodes, :, 0]
         opening = np.einsum("nkc,nkc->nk", normal, jump) + pair.gap[stencil.nodes]
         return np.stack([stencil(opening), self._grown[tips.node]], axis=1)
 

@@ -71,9 +71,10 @@ class LengthEvaluator:
         self.paths = SurfacePaths(self.front)
         self.reference = mean_position(model, criterion.reference)
         self.ends = float(criterion.times[-1])
-        self._known: tuple[int, bytes] | None = None
+        self._known: tuple[int, int, bytes] | None = None
         self._origins: Origins
-        surface, initial = self.front.surface, self.paths.initial
+        surface, initial = model.pairs[p].surface, self.paths.initial  # undeformed
+        self._x = surface.x
         self._begin = np.zeros((surface.n_nodes, 3))
         self._grown = np.zeros(surface.n_nodes)
         self._moves = np.zeros(surface.n_nodes, dtype=bool)
@@ -106,10 +107,10 @@ class LengthEvaluator:
 
     def _look_at(self, tips: Tips) -> Origins:
         """Note where the tips come from, when the front has moved."""
-        key = (self.front.version, tips.node.tobytes())
+        key = (self.front.version, self.front.placed, tips.node.tobytes())
         if key != self._known:
             origins = self._origins = self.paths.origins(tips)
-            x = self.front.surface.x[origins.nodes]
+            x = self._x[origins.nodes]
             self._begin[tips.node] = np.einsum("nk,nkc->nc", origins.weights, x)
             self._grown[tips.node] = origins.grown
             self._moves[tips.node] = self._starts[origins.nearest]

@@ -147,8 +147,12 @@ class Loading(Account):
         if not self._walk(0.0, upward=False):
             raise InputError("stepping='path': f stays above 1 down to zero load; check prestress")
 
-    def _unload_until(self, excess: Callable[[Equilibrium], float]) -> bool:
+    def _unload_until(self, excess: Callable[[Equilibrium], float], close: float) -> bool:
         """Take load away until a quantity that is linear along pieces has fallen to zero.
+
+        Args:
+            excess: The quantity in a state.
+            close: What counts as zero where it cannot be met exactly.
 
         Returns:
             Whether it did before the load was gone.

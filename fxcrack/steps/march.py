@@ -21,7 +21,7 @@ from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
 from fxcrack.steps.letting_go import TimedRelease
 from fxcrack.steps.loading import BEYOND, Loading
-from fxcrack.steps.opening import SAME_OPENING, OpeningControl
+from fxcrack.steps.opening import OpeningControl
 
 Observer = Callable[[str, Row], None]
 
@@ -156,8 +156,8 @@ class March(Loading):
             self._record("onset")
             self._free()
             more = control.excess(self.model.state)
-            same = abs(more) <= SAME_OPENING * control.opening
-            if not same and not (more > 0.0 and self._unload_until(control.excess)):
+            same = abs(more) <= control.close
+            if not same and not (more > 0.0 and self._unload_until(control.excess, control.close)):
                 raise InputError(
                     f"stepping='opening': nodes let go at {self.time:.6g} times the load, and "
                     f"'{control.name}' = {control.opening:.6g} is not found again at less; control "

@@ -7,6 +7,8 @@ and the secant through both ends gives the next guess.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from fxcrack import log
 from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.solve.jump_system import Equilibrium
@@ -37,12 +39,6 @@ class NewtonMarch(March):
             raise InputError(
                 f"stepping='{self.step.stepping}' looks for equilibria, but Inertia moves the "
                 "bodies in time; use a Dynamic step, or leave Inertia out"
-            )
-        if self.step.stepping == "opening":
-            raise InputError(
-                "stepping='opening' needs linear bodies, but this scene takes the nonlinear path; "
-                "use 'path', which follows the load through its falls at f = 1, or prescribe "
-                "displacements"
             )
         self.model.exact = any(
             getattr(c, "method", "") == "closure"
@@ -144,6 +140,47 @@ class NewtonMarch(March):
             self.model.accept()
             if (begin[1] - 1.0) * (_largest(values) - 1.0) < 0.0:
                 other = begin
+
+    def _unload_until(self, excess: Callable[[Equilibrium], float], close: float) -> bool:
+        whole, size, back = self.time, self.step.maximum, self.time
+        for _ in range(_MANY + int(min(whole / size, 1e4))):
+            here, begin, value = self.model.state, self.time, excess(self.model.state)
+            self._values = self._evaluate()
+            if abs(value) <= close:
+                return True
+            if value > 0.0 and begin <= 0.0:
+                return False
+            guess = self._zero(excess, value, max(begin - size, 0.0) if value > 0.0 else back)
+            loads, force = self.loads_at(guess), self._force_at(guess)
+            try:
+                point = self.model.move(loads, force, guess, guess - begin)
+            except ConvergenceError as error:
+                size = 0.25 * abs(guess - begin)
+                if size < _SMALLEST * whole:
+                    raise TooManyCutbacks(str(error)) from error
+                continue
+            self._advance(here, point, guess)
+            self.model.accept()
+            if value > 0.0:
+                back = begin
+        raise TooManyCutbacks("the load at the controlled opening is not found")
+
+    def _zero(self, excess: Callable[[Equilibrium], float], value: float, target: float) -> float:
+        """Time on the way to a target where the tangent has a quantity at zero, or the target."""
+        system = self.model.system
+        saved = system.snapshot()
+        begin, done, found = self.time, 0.0, target
+        state, loads, force = self.model.state, self.loads_at(target), self._force_at(target)
+        for fraction, point in system.pieces(state, loads, force):
+            after = excess(point)
+            if value * after <= 0.0:
+                found = begin + (target - begin) * (
+                    done + value / (value - after) * (fraction - done)
+                )
+                break
+            done, value = fraction, after
+        system.restore(saved)
+        return found
 
     def _predicted(self, target: float, *, upward: bool) -> float:
         """Time before a target at which f reaches 1 on the tangent; the target if it does not."""

@@ -1,9 +1,11 @@
 """Opening control: the load factor follows from a monitored displacement that never falls.
 
-With the bonds as they are the opening is linear in the load factor t on each piece of its way, so
-that the factor at a given opening d is found in closed form,
+With the bonds as they are the opening of linear bodies is linear in the load factor t on each piece
+of its way, so that the factor at a given opening d is found in closed form,
 
     t = t_a + (d - d_a)/(d_b - d_a) (t_b - t_a).
+
+With nonlinear bodies that is where their tangent leads, and it is repeated.
 """
 
 from __future__ import annotations
@@ -40,7 +42,7 @@ class OpeningControl:
     def __init__(
         self, model: CondensedModel, growths: Sequence[Growth], names: Sequence[str]
     ) -> None:
-        self._system = model.system
+        self._model = model
         self.name = " - ".join(names)
         self.opening = 0.0
         titles = [m.title for m in model.monitors]
@@ -61,9 +63,14 @@ class OpeningControl:
                     "stepping='opening' does not have; release by Step, or prescribe displacements"
                 )
 
+    @property
+    def close(self) -> float:
+        """Openings that differ by less are the same, length."""
+        return SAME_OPENING * self.opening
+
     def excess(self, state: Equilibrium) -> float:
         """What the opening of a state has over that of the last onset, length."""
-        values = self._system.monitors(state)[: len(self._weight)]
+        values = self._model.system.monitors(state)[: len(self._weight)]
         return float(self._weight @ values) - self.opening
 
     def reach(self, state: Equilibrium) -> None:
@@ -73,7 +80,7 @@ class OpeningControl:
             InputError: It is not positive, or smaller than the one before.
         """
         more = self.excess(state)
-        if self.opening + more <= 0.0 or more < -SAME_OPENING * self.opening:
+        if self.opening + more <= 0.0 or more < -self.close:
             raise InputError(
                 f"stepping='opening': '{self.name}' went from {self.opening:.6g} to "
                 f"{self.opening + more:.6g} up to an onset; control a displacement that grows "

@@ -100,7 +100,7 @@ def bond_stress(growth: Growth, nodes: Ints, force: Array) -> Array:
         nodes: Slave nodes, shape (n,).
         force: Force on the slave side per window component, shape (n_window,).
     """
-    areas = growth.front.surface.areas[nodes]
+    areas = growth.model.pairs[growth.p].surface.areas[nodes]
     areas = np.where(areas > 0.0, areas, np.inf)  # corners of second-order facets may have none
     return np.asarray(-growth.model.vectors(growth.p, nodes, force) / areas[:, None])
 

@@ -21,7 +21,7 @@ class Static:
             f = 1, also where that means unloading (snap-back under load control); "opening" finds
             the load factor of a proportional load from a monitored displacement that never falls:
             after nodes have let go the load falls until the opening is what it was, and nodes
-            whose f is still 1 or more go at the same opening. Linear bodies without friction.
+            whose f is still 1 or more go at the same opening. Not with friction.
         opening: With stepping="opening", the name of the monitor that is controlled, or of two of
             which it is the first less the second, e.g. both faces at the crack mouth. It must grow
             with the load.
