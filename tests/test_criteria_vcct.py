@@ -233,6 +233,14 @@ def test_a_pressed_corner_of_a_pulled_unit_counts() -> None:
     assert closure_rates(p, delta, 1.0)[0, 0] == pytest.approx(0.5 * (1.2 - 0.2))
 
 
+def test_a_unit_pressed_ahead_opens_if_that_sets_energy_free() -> None:
+    # Arms thinner than an element is long: pulled at the tip, pressed harder at the midside ahead.
+    p = np.array([[[2.0, 0.0, 0.0], [-3.0, 0.0, 0.0]]])
+    delta = np.array([[[0.5, 0.0, 0.0], [0.1, 0.0, 0.0]]])
+    assert closure_rates(p, delta, 1.0)[0, 0] == pytest.approx(0.5 * (1.0 - 0.3))
+    assert closure_rates(p, -delta, 1.0)[0, 0] == 0.0
+
+
 def test_closure_errors() -> None:
     p = np.ones((2, 1, 3))
     with pytest.raises(InputError, match=r"the area of unit 1 is 0\.0"):

@@ -18,12 +18,31 @@ from fxcrack.criteria.checks import Array
 from fxcrack.errors import InputError
 
 
+def opens(force: npt.ArrayLike, jump: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Which units open when they are released.
+
+    Those that are in tension do; also those in which the nodes ahead are pressed together harder
+    than the first is pulled (arms thinner than an element is long), if they set free energy by
+    opening.
+
+    Args:
+        force: Normal bond forces, tension positive, shape (n, k) [force].
+        jump: Normal jumps after release of all components, shape (n, k) [length].
+
+    Returns:
+        Shape (n,).
+    """
+    p, delta = np.asarray(force, dtype=np.float64), np.asarray(jump, dtype=np.float64)
+    pulled = p.sum(axis=1) > 0.0
+    return np.asarray(pulled | ((delta.sum(axis=1) > 0.0) & ((p * delta).sum(axis=1) > 0.0)))
+
+
 def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike) -> Array:
     """Split the closure energy of units by mode.
 
-    A unit pressed together (its normal forces add up to compression) stays closed when released:
-    its G_I is zero. The sum decides, not each node: in some second-order faces the corner force of
-    a uniform tension is zero or negative. For such units compute ``jump`` with the normal held, so
+    A unit pressed together (:func:`opens` says no) stays closed when released: its G_I is zero.
+    The sum of its forces decides, not each node: in some second-order faces the corner force of a
+    uniform tension is zero or negative. For such units compute ``jump`` with the normal held, so
     that shear alone is released.
 
     Args:
@@ -55,5 +74,5 @@ def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike
             "finite: look at the mesh near this front node"
         )
     rates = 0.5 * (p * delta).sum(axis=1) / a[:, None]
-    rates[p[..., 0].sum(axis=1) <= 0.0, 0] = 0.0
+    rates[~opens(p[..., 0], delta[..., 0]), 0] = 0.0
     return np.asarray(rates)

@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_solve
 
+from fxcrack.criteria.closure import opens
 from fxcrack.interface.tip import Tips
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.jump_system import Equilibrium
@@ -75,27 +76,43 @@ def closure_jumps(model: WindowModel, p: int, tips: Tips, force: Array) -> Array
         force: Their bond forces in tip frames, shape (n, k, 3).
     """
     out = np.zeros_like(force)
-    gdim = model.continuum.gdim
     for i in range(len(tips)):
         nodes = np.unique(tips.force_nodes[i])
         index = model.index[p][nodes]
-        slot = index >= 0
-        if force[i, : len(nodes), 0].sum() <= 0.0:
-            slot[:, 0] = False  # pressed together: it stays closed, shear alone is released
-        star = model.system.reduced(index[slot])
-        try:
-            factor = model.system.cholesky.factorise(star, index[slot])
-        except NotPositiveDefinite:
-            factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
-        vector = np.einsum("ci,ki->kc", tips.frame[i], force[i, : len(nodes)])
         order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
-        local = np.einsum("kci,kc->ki", model.frames[p][nodes[order]], vector[:, :gdim])
-        right = np.zeros((len(nodes), gdim))
-        right[order] = local
-        jump = np.zeros((len(nodes), gdim))
-        jump[slot] = cho_solve((factor, True), right[slot])
-        jump = jump[order]
+        frames = model.frames[p][nodes]
+        pull = np.zeros((len(nodes), model.continuum.gdim))
+        pull[order] = _turned(frames[order], force[i, : len(nodes)] @ tips.frame[i].T)
+        jump = _released(model, index, index >= 0, pull)
+        if not opens(pull[None, :, 0], jump[None, :, 0])[0]:
+            held = index >= 0
+            held[:, 0] = False  # pressed together: it stays closed, shear alone is released
+            jump = _released(model, index, held, pull)
         world = np.zeros((len(nodes), 3))
-        world[:, :gdim] = np.einsum("kci,ki->kc", model.frames[p][nodes[order]], jump)
-        out[i, : len(nodes)] = world @ tips.frame[i]
+        world[:, : pull.shape[1]] = np.einsum("kci,ki->kc", frames, jump)
+        out[i, : len(nodes)] = world[order] @ tips.frame[i]
     return out
+
+
+def _turned(frames: Array, vectors: Array) -> Array:
+    """Global vectors, shape (k, 3), in local frames of shape (k, gdim, gdim)."""
+    return np.asarray(np.einsum("kci,kc->ki", frames, vectors[:, : frames.shape[1]]))
+
+
+def _released(model: WindowModel, index: Ints, free: npt.NDArray[np.bool_], force: Array) -> Array:
+    """Jumps of a unit without some of its bonds, in local frames.
+
+    Args:
+        model: The model.
+        index: Components in the window, shape (k, gdim).
+        free: Those let go, likewise.
+        force: Their bond forces, likewise.
+    """
+    jump = np.zeros(index.shape)
+    star = model.system.reduced(index[free])
+    try:
+        factor = model.system.cholesky.factorise(star, index[free])
+    except NotPositiveDefinite:
+        factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
+    jump[free] = cho_solve((factor, True), force[free])
+    return jump

@@ -15,7 +15,8 @@ from mpi4py import MPI
 from specimens import CLAMPED_3D, bond, specimen
 
 import fxcrack as fx
-from fxcrack.meshes.dcb import dcb_3d
+from fxcrack.beams import CorrectedBeam
+from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from stability.beams import LENGTH, SELF, arms, grown, released_energies, shift
 
 pytestmark = pytest.mark.stability
@@ -76,6 +77,24 @@ def test_spacing(name: str, method: str) -> None:
     else:
         mean = history["released_energy"][-1] / (lengths[-1] - lengths[0])
         assert mean == pytest.approx(0.2, rel=rtol)
+
+
+@pytest.mark.parametrize("height", [0.2, 2.0])
+def test_second_order_elements_longer_than_the_arm_is_high(height: float) -> None:
+    """The midside ahead of the tip is pressed harder than the tip is pulled; the unit still opens.
+
+    Elements are 5 heights long or half a height; G of both methods is that of beam theory.
+    """
+    beam = CorrectedBeam(E=70e3, E22=70e3, G=70e3 / 2.6, h=height, b=1.0)
+    for method in ("vcct", "closure"):
+        scene = specimen(
+            dcb_2d(length=40.0, height=height, dx=1.0, ny=1, order=2),
+            a0=A0,
+            criterion=fx.VCCT(GIc=0.2, method=method),
+            model=fx.PlaneStress(),
+        )
+        row = next(r for r in scene.run(fx.Static(fx.Releases(1))) if r["event"] == "onset")
+        assert row["R[pin_top.y]"] == pytest.approx(beam.dcb_load(A0, 0.2), rel=0.1), method
 
 
 @pytest.mark.parametrize("gap", [1e-7, -1e-7, 1e-4])
