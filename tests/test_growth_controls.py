@@ -63,6 +63,26 @@ def test_energy_release_rates_are_not_hurried_so() -> None:
     assert steps.min() > 1e-4
 
 
+def test_neutral_growth_goes_on_in_small_increments() -> None:
+    """Pure moments: f is the same at every crack length, at last the upper end of its window."""
+
+    def moment(sign: float, y: float) -> tuple[fx.loads.Field, ...]:
+        return (lambda x: sign * (x[1] - y), 0.0)
+
+    loads = [
+        fx.Traction("end_upper", moment(1.0, 0.75)),
+        fx.Traction("end_lower", moment(-1.0, -0.75)),
+    ]
+    scene = specimen(dcb_2d(length=110.0, dx=1.0, ny=2), supports=HELD_FAR, loads=loads)
+    history = grow_to(scene, 90.0, stepping="increment", initial=7.0, maximum=7.0)
+    assert history.reason == "crack length 90 of 'bond' reached"
+    at = [r for r in history if r["event"] == "increment" and r["f[bond]"] >= 1.0]
+    assert len(at) == 60 and max(r["f[bond]"] for r in at) < 1.2
+    # the last nodes go one by one at one load
+    assert 0.0 < at[-1]["time"] - at[-20]["time"] < 1e-6
+    assert_balanced(history)
+
+
 # --- giving up ------------------------------------------------------------------------------------
 
 

@@ -17,6 +17,7 @@ from fxcrack.errors import ComesApart, ConvergenceError, InputError
 from fxcrack.output.history import Row
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.steps.account import LARGE
+from fxcrack.steps.evaluate import TipValues
 from fxcrack.steps.growth import Growth
 from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
 from fxcrack.steps.letting_go import TimedRelease
@@ -25,6 +26,9 @@ from fxcrack.steps.opening import OpeningControl
 
 Observer = Callable[[str, Row], None]
 
+_AT_TOP, _NEAR_TOP = 1e-6, 1e-2
+"""How far f may differ from the upper end of its window by what one node has of the next, and the
+fraction of the window in which it is so near that end that cutting back gains nothing."""
 _NEVER = (
     "the criterion is not reached however large the load becomes; the step ends where that search "
     "began"
@@ -180,7 +184,7 @@ class March(Loading):
             self._let_go()
 
     def _run_increments(self) -> str:
-        control = self.control
+        control, creeps = self.control, False
         while True:
             self._rest()
             reason = self._ended()
@@ -196,7 +200,8 @@ class March(Loading):
                 return "the criterion is not reached however large the load becomes"
             control.size = max(control.size, min(self._scaled(), self.step.maximum))
             met = self._met_at_start()
-            size = self.step.minimum if any(met) else control.size
+            smallest = creeps or any(met)
+            size = self.step.minimum if smallest else control.size
             target = min([self.time + size, self._end_time, *self._breaks_ahead()])
             books = self._books()
             self.increment += 1
@@ -216,9 +221,11 @@ class March(Loading):
                 for g, v, no_matter in zip(self.growths, values, met, strict=True)
                 if not no_matter
             ]
-            if max(excess, default=-1.0) > 1e-12:
+            if max(excess, default=-1.0) > (_AT_TOP if creeps else 1e-12):
                 used = target - self._undo(books)
-                control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
+                creeps = not creeps and self._cuts_in_vain(values, used)
+                if not creeps:
+                    control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
                 continue
             self._values = values
             self.model.accept()
@@ -226,8 +233,9 @@ class March(Loading):
                 if not isinstance(ramp, TimedRelease):
                     ramp.accept(self.time, self.model)
             self._record("increment")
-            if not any(met):
+            if not smallest:
                 control.accepted()
+            creeps = False
             while self._any_ready() and not self._ended():
                 self._let_go(all_ready=True)
                 control.suggest(self._first_increment())
@@ -280,6 +288,28 @@ class March(Loading):
             and bool(v.f.max(initial=0.0) >= g.criterion.window[0])
             for g, v in zip(self.growths, self._values, strict=True)
         ]
+
+    def _cuts_in_vain(self, after: list[TipValues], used: float) -> bool:
+        """Whether the cutbacks left cannot keep f in its window, and the smallest increment can.
+
+        So it is where growth is neutral: f stays what it was when a node goes, at the upper end of
+        its window at last. The next node then goes at the same load.
+
+        Args:
+            after: What the criteria said at the end of the increment that was undone.
+            used: Its size, time.
+        """
+        left = self.step.cutback ** (self.step.max_cutbacks - self.control.cutbacks)
+        left = max(left, self.step.minimum / used)
+        for g, v, w in zip(self.growths, self._values, after, strict=True):
+            upper, f, later = self._upper(g), v.f.max(initial=0.0), w.f.max(initial=0.0)
+            if later <= upper:
+                continue
+            low = g.criterion.window[0]
+            near = f >= upper - _NEAR_TOP * (upper - low) or left * (later - f) > upper - f
+            if not (low <= f <= upper + _AT_TOP and near):
+                return False
+        return True
 
     def _may_run_on(self) -> bool:
         """Whether more nodes may go at this load: within the unstable growth tolerance."""
