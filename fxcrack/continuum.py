@@ -26,7 +26,7 @@ from fxcrack.errors import InputError, agree
 from fxcrack.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
 from fxcrack.materials import Material
 from fxcrack.mesh import Mesh
-from fxcrack.models import Model
+from fxcrack.models import Axisymmetric, Model
 
 if TYPE_CHECKING:
     from fxcrack.temperature import Temperature
@@ -73,6 +73,16 @@ class Continuum:
             raise InputError(
                 f"{type(model).__name__} needs a mesh of dimension {model.gdim}, "
                 f"but mesh '{mesh.name}' has dimension {mesh.gdim}"
+            )
+        if isinstance(model, Axisymmetric):
+            r = mesh.domain.geometry.x[:, 0]
+            inside = float(r.min(initial=0.0)) < -1e-9 * float(np.abs(r).max(initial=0.0))
+            agree(
+                mesh.comm,
+                f"Axisymmetric: mesh '{mesh.name}' has nodes at radius x = {r.min():g}; model one "
+                "half-section with x >= 0, the axis at x = 0"
+                if inside
+                else None,
             )
         self.mesh = mesh
         self.model = model
@@ -129,10 +139,12 @@ class Continuum:
             count[group[group < n_cells]] += 1
         bad = None
         if np.any(count != 1):
+            named = {n for n, g in self.mesh.groups.items() if g.dim == self.mesh.tdim}
             bad = (
                 f"materials cover {np.sum(count == 0)} cells of this rank not at all and "
                 f"{np.sum(count > 1)} more than once; name every cell group exactly once "
-                f"(given: {', '.join(materials)})"
+                f"(given: {', '.join(materials)}; not given: "
+                f"{', '.join(sorted(named - set(materials))) or 'none'})"
             )
         agree(self.comm, bad)
         self.part_materials = list(materials.values())

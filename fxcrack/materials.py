@@ -91,6 +91,14 @@ class Orthotropic:
 
     def __post_init__(self) -> None:
         """Check the constants and the frame."""
+        parts = {"E": "E1, E2, E3", "nu": "nu12, nu13, nu23", "G": "G12, G13, G23"}
+        for name, needed in parts.items():
+            value = getattr(self, name)
+            if np.shape(value) != (3,) or np.asarray(value).dtype.kind not in "fiu":
+                raise InputError(
+                    f"Orthotropic: {name} = {value!r} must be three numbers, ({needed}); a ply "
+                    "that is alike across its fibres has E3 = E2, nu13 = nu12, G13 = G12"
+                )
         if min(*self.E, *self.G) <= 0.0 or not np.all(np.isfinite([*self.E, *self.G, *self.nu])):
             raise InputError(f"Orthotropic: E = {self.E} and G = {self.G} must be positive numbers")
         if np.linalg.eigvalsh(self._compliance()).min() <= 0.0:

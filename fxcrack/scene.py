@@ -16,6 +16,7 @@ from fxcrack.continuum import Continuum
 from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.errors import InputError
 from fxcrack.inertia import Inertia
+from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
 from fxcrack.loads import (
@@ -221,11 +222,7 @@ class Scene:
         growths = [g for g, on in zip(self.growths, active, strict=False) if on]
         for g in growths:
             if not len(g.tips()):
-                log.warn(
-                    "interface '%s' has no crack tip: its bonded set leaves no open node beside a "
-                    "bonded one, so nothing can debond",
-                    g.title,
-                )
+                log.warn("%s, so nothing can debond", why_no_tip(g.front))
         keeper = keeper_of(self, step, active, checkpoint, restart, save)
         self.model.prepare(active, self._reach(step))
         if keeper.resume is not None:

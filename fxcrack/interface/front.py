@@ -349,3 +349,15 @@ class Front:
             np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth, s), d_ahead, d_behind,
             width, across * d_ahead if d_ahead > 0.0 else 0.5 * width * d_behind,
         )  # fmt: skip
+
+
+def why_no_tip(front: Front) -> str:
+    """Why an interface has no tip, with where its slave nodes are, in words."""
+    n, x = int(front.bonded.sum()), front.surface.x
+    x = np.where(np.abs(x) < 1e-9 * np.ptp(x), 0.0, x)
+    share = {0: "none", len(x): "all"}.get(n, f"{n}")
+    return (
+        f"interface '{front.title}' has no crack tip: {share} of its {len(x)} slave nodes, between "
+        f"{place(x.min(axis=0))} and {place(x.max(axis=0))}, are bonded, and no open one is beside "
+        "a bonded one"
+    )

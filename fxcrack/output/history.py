@@ -21,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from fxcrack.errors import unknown_name
+from fxcrack.errors import InputError, unknown_name
 from fxcrack.output.atomic import replacing
 from fxcrack.output.collective import together
 
@@ -88,14 +88,28 @@ class History:
         return np.array([row.get(column, np.nan) for row in self.rows])
 
     def at(self, column: str, value: float, *, event: str | None = None) -> Row:
-        """First row where a column reaches a value (to round-off), optionally of one event."""
+        """First row where a column reaches a value (to round-off), optionally of one event.
+
+        Raises:
+            InputError: There is no such row, column or event.
+        """
         for row in self.rows:
             found = row.get(column, np.nan)
             if event is not None and row["event"] != event:
                 continue
             if isinstance(found, (int, float)) and found >= value - 1e-9 * abs(value):
                 return row
-        unknown_name(f"row with {column} >=", str(value), [f"{len(self.rows)} rows"])
+        if self.rows and column not in self.columns:
+            unknown_name("column", column, self.columns)
+        chosen = [r for r in self.rows if event is None or r["event"] == event]
+        if not chosen:
+            events = list(dict.fromkeys(str(r["event"]) for r in self.rows))
+            unknown_name("row of event", str(event), events)
+        most = max((r[column] for r in chosen if column in r), default="none")
+        raise InputError(
+            f"there is no row with {column} >= {value:g} among {len(chosen)} rows"
+            f"{'' if event is None else f' of event {event!r}'}; the largest is {most}"
+        )
 
     def to_csv(self, path: str | Path) -> None:
         """Write all rows as comma-separated values; collective, rank 0 writes."""

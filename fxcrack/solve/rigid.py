@@ -47,9 +47,24 @@ def check_held(continuum: Continuum, supports: Supports) -> None:
     """
     held = rigid_motions(continuum)[supports.which >= 0]
     gram = continuum.comm.allreduce(held.T @ held)
-    eigenvalues = np.linalg.eigvalsh(gram)
-    if eigenvalues[0] <= 1e-12 * max(float(eigenvalues[-1]), 1e-300):
-        raise SolverError(mumps_message(-10, 0))
+    eigenvalues, vectors = np.linalg.eigh(gram)
+    free = vectors[:, eigenvalues <= 1e-12 * max(float(eigenvalues[-1]), 1e-300)]
+    if free.shape[1]:
+        raise SolverError(f"{mumps_message(-10, 0)} (the supports leave the whole {_ways(free)})")
+
+
+def _ways(free: Array) -> str:
+    """What motions that nothing holds do, in words.
+
+    Args:
+        free: Coefficients of the rigid motions, shape (n_motions, n_free), orthonormal columns.
+    """
+    names = {1: ["y"], 3: ["x", "y"], 6: ["x", "y", "z"]}[len(free)]
+    moves = [n for n, row in zip(names, free, strict=False) if row @ row > 1.0 - 1e-6]
+    words = [f"free to move along {' and '.join(moves)}"] if moves else []
+    if free.shape[1] > len(moves):
+        words.append("free to turn")
+    return ", and ".join(words)
 
 
 def _least(a: Array, b: Array) -> Array:

@@ -315,6 +315,7 @@ class Account:
             row[f"a[{g.title}]"] = g.extent.length(v.tips)
             row[f"area[{g.title}]"] = g.extent.area(v.tips)
             row[f"released[{g.title}]"] = g.n_released
+            g.look_for_overlap(v.tips, state)
             if len(v.tips):
                 i = v.largest
                 row[f"f[{g.title}]"] = float(v.f[i])

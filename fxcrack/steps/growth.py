@@ -30,6 +30,7 @@ from fxcrack.mesh.raw import place
 from fxcrack.solve.condensed import CondensedModel
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.soft_bond import SoftUnit
+from fxcrack.solve.tips import openings
 from fxcrack.steps.evaluate import Evaluator, RateEvaluator, TipValues, first_crossing
 from fxcrack.steps.evaluate_distance import OpeningEvaluator, StressEvaluator
 from fxcrack.steps.evaluate_length import LengthEvaluator
@@ -42,6 +43,9 @@ Criterion = RateCriterion | CriticalStress | CrackOpening | CrackLengthVsTime
 
 _TIE = 1e-6
 """Front nodes whose f lies within this fraction of the largest one are let go together."""
+
+_OVERLAP = 1e-2
+"""Faces that overlap by less than this fraction of how they move on each other are not told of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +167,7 @@ class Growth:
         self.n_released = 0
         self.records: list[ReleaseRecord] = []
         self.paths = SurfacePaths(self.front)
+        self._may_overlap = not debond.interface.contact
 
     @property
     def released(self) -> list[tuple[int, float]]:
@@ -207,6 +212,24 @@ class Growth:
         for other in self.watched:
             report = {**other.value(tips, other.measure(tips, state, time))[1], **report}
         return TipValues(tips, f, report, measured, state)
+
+    def look_for_overlap(self, tips: Tips, state: Equilibrium) -> None:
+        """Warn once where faces without contact pass through each other behind a tip."""
+        if not self._may_overlap or not len(tips):
+            return
+        behind = openings(self.model, self.p, tips, state)
+        size = np.abs(behind).max()
+        i, k = np.unravel_index(np.argmin(behind[..., 0]), behind.shape[:2])
+        if behind[i, k, 0] < -_OVERLAP * size:
+            self._may_overlap = False
+            log.warn(
+                "interface '%s': the open faces overlap behind the tip at %s, by %.3g, and nothing "
+                "keeps them apart; add contact=True to the Interface, or check the sign of the "
+                "loads",
+                self.title,
+                place(self.front.surface.x[tips.node[i]]),
+                -behind[i, k, 0],
+            )
 
     def crossing(
         self,

@@ -29,7 +29,12 @@ class CrackLength:
     length: float
 
     def __post_init__(self) -> None:
-        """Refuse a length no crack can be compared with."""
+        """Refuse a length no crack can be compared with, and what is no interface."""
+        if not isinstance(self.interface, Interface):
+            raise InputError(
+                f"CrackLength: interface = {self.interface!r} must be the Interface itself; write "
+                "bond = Interface(...) and CrackLength(bond, length)"
+            )
         if not math.isfinite(self.length):
             raise InputError(f"CrackLength({self.length}): the length must be a finite number")
 

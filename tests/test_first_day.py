@@ -1,0 +1,108 @@
+"""What a first-day user gets wrong, and what he is told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from specimens import FORCES, HELD_FAR, PINS, bond, grow_to, specimen
+
+import fxcrack as fx
+from fxcrack.meshes.dcb import dcb_2d
+from fxcrack.meshes.enf import enf_2d
+
+
+def mesh(comm: MPI.Comm) -> fx.Mesh:
+    return dcb_2d(comm, length=60.0, dx=2.0, ny=1)
+
+
+@pytest.mark.parametrize(
+    ("part", "words"),
+    [
+        ({"E": (1e5, 1e4)}, r"E = \(100000.0, 10000.0\) must be three numbers, \(E1, E2, E3\)"),
+        ({"nu": 0.3}, r"nu = 0.3 must be three numbers, \(nu12, nu13, nu23\)"),
+        ({"G": ("5e3", 5e3, 5e3)}, r"G = .* must be three numbers, \(G12, G13, G23\)"),
+    ],
+)
+def test_constants_of_an_orthotropic_ply(part: dict[str, object], words: str) -> None:
+    ply = {"E": (1e5, 1e4, 1e4), "nu": (0.3, 0.3, 0.4), "G": (5e3, 5e3, 4e3)}
+    with pytest.raises(fx.InputError, match=words):
+        fx.Orthotropic(**{**ply, **part})
+
+
+def test_crack_length_by_name() -> None:
+    with pytest.raises(fx.InputError, match="interface = 'bond' must be the Interface itself"):
+        fx.CrackLength("bond", 40.0)
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize(
+    ("supports", "words"),
+    [
+        ([], "free to move along x and y, and free to turn"),
+        ([fx.Displacement("pin_top", y=1.0)], "free to move along x, and free to turn"),
+        ([fx.Displacement("pin_top", x=0.0, y=1.0)], "leave the whole free to turn"),
+        ([fx.Displacement("top", y=1.0)], r"leave the whole free to move along x\)"),
+    ],
+)
+def test_forgotten_support(comm: MPI.Comm, supports: list[fx.Displacement], words: str) -> None:
+    with pytest.raises(fx.FxcrackError, match=f"can still move freely.*{words}"):
+        grow_to(specimen(mesh(comm), supports=supports), 40.0)
+
+
+@pytest.mark.mpi
+def test_section_on_both_sides_of_the_axis(comm: MPI.Comm) -> None:
+    plate = mesh(comm)
+    plate.domain.geometry.x[:, 0] -= 20.0
+    with pytest.raises(fx.InputError, match=r"nodes at radius x = -.*; model one half-section"):
+        specimen(plate, model=fx.Axisymmetric())
+
+
+def test_material_left_out(comm: MPI.Comm) -> None:
+    with pytest.raises(fx.InputError, match=r"given: upper; not given: lower\)"):
+        specimen(mesh(comm), materials={"upper": fx.Isotropic(7e4, 0.3)})
+
+
+@pytest.mark.parametrize(("first", "share"), [(-1.0, "all"), (3e4, "none")])
+def test_bonded_set_in_other_units(
+    comm: MPI.Comm, caplog: pytest.LogCaptureFixture, first: float, share: str
+) -> None:
+    grow_to(specimen(mesh(comm), interface=bond(first), supports=[*PINS, *HELD_FAR]), 40.0)
+    assert f"{share} of its 31 slave nodes, between (0, 0, 0) and (60, 0, 0), are" in caplog.text
+
+
+def test_rows_that_do_not_exist(comm: MPI.Comm) -> None:
+    history = grow_to(specimen(mesh(comm)), 34.0)
+    with pytest.raises(fx.InputError, match=r"no row with a\[bond\] >= 99 among"):
+        history.at("a[bond]", 99.0)
+    with pytest.raises(fx.InputError, match=r"no row of event 'onst'.*did you mean 'onset'"):
+        history.at("a[bond]", 31.0, event="onst")
+    with pytest.raises(fx.InputError, match="no column 'bond'"):
+        history.at("bond", 31.0)
+
+
+def test_faces_that_pass_through_each_other(
+    comm: MPI.Comm, caplog: pytest.LogCaptureFixture
+) -> None:
+    for contact in (True, False):
+        beam = specimen(
+            enf_2d(comm, half_span=50.0, dx=2.0, ny=1),
+            contact=contact,
+            supports=[
+                fx.Displacement("support_left", y=0.0),
+                fx.Displacement("support_right", x=0.0, y=0.0),
+            ],
+            loads=[fx.PointForce("load", (0.0, -1.0))],
+        )
+        beam.run(fx.Static(until=fx.Releases(1)))
+        assert ("open faces overlap behind the tip at (30, 0, 0)" in caplog.text) != contact
+    assert caplog.text.count("overlap") == 1
+
+
+def test_loads_of_the_wrong_sign(comm: MPI.Comm, caplog: pytest.LogCaptureFixture) -> None:
+    closing = [fx.PointForce(f.where, tuple(-np.array(f.value))) for f in FORCES]
+    history = specimen(mesh(comm), supports=HELD_FAR, loads=closing).run(
+        fx.Static(until=fx.Time(9.0))
+    )
+    assert history.rows[-1]["f[bond]"] == 0.0
+    assert "or check the sign of the loads" in caplog.text
