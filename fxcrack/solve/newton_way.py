@@ -15,11 +15,16 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from fxcrack.errors import ConvergenceError
 from fxcrack.solve.jump_system import Equilibrium, bond_work
 from fxcrack.solve.linear_jumps import Snapshot
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
+
+
+class OffBalance(ConvergenceError):
+    """The integrals along a way do not add up to what the bodies have stored: it is too long."""
 
 
 @dataclass(frozen=True)

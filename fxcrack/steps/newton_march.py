@@ -21,6 +21,8 @@ _AT_ONE = 1e-9
 """How near to 1 the criterion must be at an onset."""
 _MANY = 30
 """Times it is looked for on the way back; round-off of f may keep it farther off than that."""
+_NO_WAY = 4e-16
+"""Part of the time below which no way is made."""
 _SMALLEST = 1e-6
 """Smallest piece of a way, before it counts as impassable."""
 
@@ -59,8 +61,10 @@ class NewtonMarch(March):
         whole = abs(target - self.time)
         size = self.step.maximum
         beyond: tuple[float, float] | None = None
+        idle = 0
         while True:
-            self._renew()
+            if self._renew():
+                beyond = None  # with other pairs f was another one there
             begin = self.time
             way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
             guess = self._predicted(begin + way, upward=upward)
@@ -95,6 +99,11 @@ class NewtonMarch(March):
                 return True
             if guess == target:
                 return False
+            idle = idle + 1 if abs(guess - begin) <= _NO_WAY * abs(begin) else 0
+            if idle:
+                beyond = None
+            if idle > _MANY:
+                raise TooManyCutbacks(f"f stays at {level:.9g} where it should reach 1")
             if beyond is None:
                 size = min(2.0 * size, self.step.maximum)
                 self._record("increment")
@@ -217,11 +226,13 @@ class NewtonMarch(March):
     def _evaluate(self) -> list[TipValues]:
         return self._evaluate_at(self.model.state, self.time)
 
-    def _renew(self) -> None:
-        """Renew the pairing of faces that have slid, where the bodies move far."""
-        if self.model.renew_pairs():
+    def _renew(self) -> bool:
+        """Renew the pairing of faces that have slid, where the bodies move far; whether it has."""
+        changed = self.model.renew_pairs()
+        if changed:
             self.work += self.model.settle(self._force_at(self.time))
             self._values = self._evaluate()
+        return changed
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
         self._renew()
