@@ -347,6 +347,7 @@ def test_restarted_anywhere_a_run_ends_the_same(
         "event, shear and contact",
         "3-D",
         "viscosity",
+        "finite strain, event, turning load",
         "finite strain, increments, friction",
         "plastic",
         "nonlinear path, progressive",
