@@ -162,3 +162,31 @@ def test_softening_bonds_are_as_they_were_where_the_search_began() -> None:
     assert history.reason.startswith("the criterion is not reached however large the load becomes")
     assert history.rows[-1]["time"] < 10.0
     assert largest_imbalance(history) < 1e-9
+
+
+# --- loads that come and go -----------------------------------------------------------------------
+
+
+def test_rows_where_amplitudes_bend() -> None:
+    """Up, down and up again: between two rows everything is linear in time."""
+    up_and_down = fx.Amplitude((0.0, 1.0, 2.0, 3.0), (0.0, 1.5, 0.0, 0.5))
+    pins = [
+        fx.Displacement("pin_top", x=0.0, y=1.0, amplitude=up_and_down),
+        fx.Displacement("pin_bottom", x=0.0, y=-1.0, amplitude=up_and_down),
+    ]
+    scene = specimen(dcb_2d(length=60.0, dx=1.0, ny=2), supports=pins)
+    history = scene.run(fx.Static(until=fx.CrackLength(scene.debonds[0].interface, 55.0)))
+    peak, down = (r for r in history if r["event"] == "bend" and r["time"] < 3.0)
+    assert (peak["time"], peak["u[pin_top.y]"]) == (1.0, 1.5)
+    assert (down["time"], down["u[pin_top.y]"]) == (2.0, 0.0)
+    assert peak["a[bond]"] == down["a[bond]"] > 31.0
+    assert abs(down["R[pin_top.y]"]) < 1e-12 * peak["R[pin_top.y]"]
+    assert_balanced(history)
+    assert history.reason == (
+        "the loads stay as they are from time 3 on, where their amplitudes end, and the criterion "
+        "is not reached"
+    )
+    # at the end of the step there is one row
+    scene = specimen(dcb_2d(length=60.0, dx=1.0, ny=2), supports=pins)
+    to_the_peak = scene.run(fx.Static(until=fx.Time(1.0)))
+    assert [r["event"] for r in to_the_peak if r["time"] == 1.0] == ["end"]

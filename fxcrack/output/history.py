@@ -1,5 +1,9 @@
 """The history of an analysis: a table with one row per event, and how it is written.
 
+Events: start and end of a step; "onset" (f = 1, just before nodes go; not in increment stepping),
+"release" (just after), "bend" (of an amplitude, in event stepping: everything is linear in time
+between rows), "snap" (softening bonds have run through unstable states), "increment".
+
 Columns (brackets hold the name of a support, load, monitor or interface):
 time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[..] load factor and
 its work-conjugate displacement, m[..] monitored displacement, a[..] crack length, area[..] open

@@ -218,7 +218,9 @@ class Growth:
         if not self._may_overlap or not len(tips):
             return
         behind = openings(self.model, self.p, tips, state)
-        size = np.abs(behind).max()
+        size = float(np.abs(behind).max())
+        if size < max(1e-12 * self.front.surface.facet_size, 1e-9 * np.abs(state.jump).max()):
+            return  # round-off
         i, k = np.unravel_index(np.argmin(behind[..., 0]), behind.shape[:2])
         if behind[i, k, 0] < -_OVERLAP * size:
             self._may_overlap = False

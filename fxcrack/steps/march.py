@@ -122,11 +122,19 @@ class March(Loading):
                 return "the curves of crack length against time have ended"
             if not self._load_to_event():
                 return self._ended() or self._never()
+            if max(self._largest()) < 1.0 - 1e-9 and not self._ended():
+                self._record("bend")
 
     def _never(self) -> str:
         """Why the load was raised in vain."""
         if not np.any(self.loads_at(self.time + 1.0)):
             return "no load acts in this step and no support moves, so the criterion is not reached"
+        last = max([self.time, *self.breaks])
+        if self.breaks and np.array_equal(self.loads_at(last), self.loads_at(last + 1.0)):
+            return (
+                f"the loads stay as they are from time {last:g} on, where their amplitudes end, "
+                "and the criterion is not reached"
+            )
         return _NEVER
 
     def _only_proportional(self) -> None:
