@@ -128,6 +128,11 @@ def bent(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
     )
 
 
+def yielding(comm: MPI.Intracomm) -> fx.Scene:
+    """The same arms, which yield at once and do not turn."""
+    return bent(comm, materials=fx.Plastic(70e3, 0.3, yield_stress=40.0, hardening=1e3), effects=[])
+
+
 RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | fx.Cycles]]] = {
     "event": (short, [fx.Static(until=fx.Releases(10))]),
     "event, contact, small windows": (
@@ -213,10 +218,12 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
     ),
     "plastic": (
-        lambda comm: bent(
-            comm, materials=fx.Plastic(70e3, 0.3, yield_stress=40.0, hardening=1e3), effects=[]
-        ),
+        yielding,
         [fx.Static(until=fx.Time(3.0), initial=0.1, maximum=0.1, **INCREMENTS)],
+    ),
+    "plastic, short": (
+        yielding,
+        [fx.Static(until=fx.Releases(3), initial=0.1, maximum=0.1, **INCREMENTS)],
     ),
     "nonlinear path, progressive": (
         lambda comm: short(comm, fx.Progressive(), path="newton"),
@@ -350,7 +357,7 @@ def test_restarted_anywhere_a_run_ends_the_same(
         "viscosity",
         "finite strain, event, turning load",
         "finite strain, increments, friction",
-        "plastic",
+        "plastic, short",
         "nonlinear path, progressive",
         "inertia, finite strain",
         "pressure that follows, temperature",
