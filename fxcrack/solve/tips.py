@@ -84,13 +84,20 @@ def closure_jumps(model: WindowModel, p: int, tips: Tips, force: Array) -> Array
         pull = np.zeros((len(nodes), model.continuum.gdim))
         pull[order] = _turned(frames[order], force[i, : len(nodes)] @ tips.frame[i].T)
         jump = _released(model, index, index >= 0, pull)
-        if not opens(pull[None, :, 0], jump[None, :, 0])[0]:
+        out[i, : len(nodes)] = _to_global(frames, jump)[order] @ tips.frame[i]
+        # whether it opens is for the frame of the tip to say, which turns with the bodies
+        if not opens(force[i : i + 1, : len(nodes), 0], out[i : i + 1, : len(nodes), 0])[0]:
             held = index >= 0
             held[:, 0] = False  # pressed together: it stays closed, shear alone is released
             jump = _released(model, index, held, pull)
-        world = np.zeros((len(nodes), 3))
-        world[:, : pull.shape[1]] = np.einsum("kci,ki->kc", frames, jump)
-        out[i, : len(nodes)] = world[order] @ tips.frame[i]
+            out[i, : len(nodes)] = _to_global(frames, jump)[order] @ tips.frame[i]
+    return out
+
+
+def _to_global(frames: Array, local: Array) -> Array:
+    """Vectors in local frames of shape (k, gdim, gdim) as global ones, shape (k, 3)."""
+    out = np.zeros((len(local), 3))
+    out[:, : local.shape[1]] = np.einsum("kci,ki->kc", frames, local)
     return out
 
 

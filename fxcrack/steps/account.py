@@ -301,7 +301,7 @@ class Account:
         state, model = self.model.state, self.model
         stored, spent = model.stored(state), model.spent()
         work = self.work + model.extra_work(state)
-        row: Row = {"time": self.time, "event": event}
+        row: Row = {"time": float(self.time), "event": event}
         for (load, answer, moves), a, r in zip(
             self._names, state.loads, state.conjugate, strict=True
         ):
