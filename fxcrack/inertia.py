@@ -51,6 +51,11 @@ class Inertia:
             raise InputError(f"Inertia: rho_inf = {self.rho_inf} must lie between 0 and 1")
         if (self.alpha_m is None) != (self.alpha_f is None):
             raise InputError("Inertia: give alpha_m and alpha_f together, or rho_inf alone")
+        if self.velocity is not None and not isinstance(self.velocity, tuple | list):
+            raise InputError(
+                f"Inertia: velocity = {self.velocity!r} must have one entry per component, each a "
+                "number or a function of position, e.g. (0.0, 1.0)"
+            )
         m, f, _, _ = self.parameters
         if not m <= f <= 0.5:
             raise InputError(

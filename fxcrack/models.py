@@ -28,9 +28,10 @@ class _Plane:
     stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "xy")
 
     def __post_init__(self) -> None:
-        if not 0.0 < self.thickness < np.inf:
+        number = isinstance(self.thickness, int | float | np.number)
+        if not (number and 0.0 < self.thickness < np.inf):
             raise InputError(
-                f"{type(self).__name__}: thickness = {self.thickness} is not positive and finite"
+                f"{type(self).__name__}: thickness = {self.thickness!r} is not positive and finite"
             )
 
     def strain(self, u: Any, x: Any) -> Any:

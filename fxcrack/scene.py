@@ -100,6 +100,10 @@ class Scene:
         debonds = several("Scene", "debonds", debonds, Debond)
         bonds = several("Scene", "bonds", bonds, Interface)
         monitors = several("Scene", "monitors", monitors, Monitor)
+        if newton is not None:
+            one("Scene", "newton", newton, NewtonOptions, "NewtonOptions(max_iterations=40)")
+        if options is not None:
+            one("Scene", "options", options, CondensedOptions, "CondensedOptions(rows=2.0)")
         if not isinstance(effects, Sequence):
             raise InputError(
                 f"Scene: effects must be a list, not {type(effects).__name__}; write effects=[...]"

@@ -46,6 +46,7 @@ def push(**words: Any) -> list[fx.Displacement]:
         ({"supports": push(amplitude=2.0)}, "give Amplitude"),
         ({"loads": [fx.PointForce("pin_top", 1.0)]}, "no list of components"),  # type: ignore[arg-type]
         ({"step": fx.Time(1.0)}, "step is Time"),
+        ({"newton": {"reuse": False}}, "newton is dict"),
         ({"supports": [fx.Displacement("pin_tap", y=1.0)]}, "did you mean 'pin_top'"),
     ],
 )
@@ -62,10 +63,18 @@ def test_parts_of_the_wrong_kind(mesh: fx.Mesh, parts: dict[str, Any], words: st
         lambda: fx.mesh_from_gmsh(None, split=fx.Split("glue", "s", "m", (0.0, 1.0))),  # type: ignore[arg-type]
         lambda: fx.VCCT(GIc="0.2"),  # type: ignore[arg-type]
         lambda: fx.Isotropic("70e3", 0.3),  # type: ignore[arg-type]
+        lambda: fx.PlaneStrain(thickness="25"),  # type: ignore[arg-type]
+        lambda: fx.Inertia(density=1.0, velocity=1.0),  # type: ignore[arg-type]
+        lambda: fx.Debond(BOND, fx.VCCT(GIc=0.2), "step"),  # type: ignore[arg-type]
+        lambda: fx.Debond(BOND, fx.VCCT(GIc=0.2), fx.Step),  # type: ignore[arg-type]
     ],
 )
 def test_values_of_the_wrong_kind(make: Callable[[], Any]) -> None:
-    with pytest.raises(fx.InputError, match=r"until|not a number|write split="):
+    words = (
+        "until|not a number|write split=|thickness = '25'|one entry per component|must lie between"
+        "|allow at least one|no release law"
+    )
+    with pytest.raises(fx.InputError, match=words):
         make()
 
 

@@ -78,7 +78,7 @@ def test_stays_within_its_limits(verdicts: list[bool], growth: float, cutback: f
         ({"stepping": "leap"}, "stepping = 'leap': choose event, increment, path or opening"),
         ({"initial": 0.0}, "0 < minimum <= initial <= maximum"),
         ({"minimum": 0.2}, "0 < minimum <= initial <= maximum"),
-        ({"maximum": 0.01}, "0 < minimum <= initial <= maximum"),
+        ({"initial": 0.2, "maximum": 0.1}, "0 < minimum <= initial <= maximum"),
         ({"growth": 0.9}, "growth must be >= 1"),
         ({"cutback": 1.0}, "cutback between 0 and 1"),
         ({"max_cutbacks": -1}, "max_cutbacks >= 0"),

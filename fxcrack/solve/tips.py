@@ -80,24 +80,15 @@ def closure_jumps(model: WindowModel, p: int, tips: Tips, force: Array) -> Array
         nodes = np.unique(tips.force_nodes[i])
         index = model.index[p][nodes]
         order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
-        frames = model.frames[p][nodes]
-        pull = np.zeros((len(nodes), model.continuum.gdim))
-        pull[order] = _turned(frames[order], force[i, : len(nodes)] @ tips.frame[i].T)
-        jump = _released(model, index, index >= 0, pull)
-        out[i, : len(nodes)] = _to_global(frames, jump)[order] @ tips.frame[i]
-        # whether it opens is for the frame of the tip to say, which turns with the bodies
-        if not opens(force[i : i + 1, : len(nodes), 0], out[i : i + 1, : len(nodes), 0])[0]:
-            held = index >= 0
-            held[:, 0] = False  # pressed together: it stays closed, shear alone is released
-            jump = _released(model, index, held, pull)
-            out[i, : len(nodes)] = _to_global(frames, jump)[order] @ tips.frame[i]
-    return out
-
-
-def _to_global(frames: Array, local: Array) -> Array:
-    """Vectors in local frames of shape (k, gdim, gdim) as global ones, shape (k, 3)."""
-    out = np.zeros((len(local), 3))
-    out[:, : local.shape[1]] = np.einsum("kci,ki->kc", frames, local)
+        frames, pulls = model.frames[p][nodes], force[i, : len(nodes)]
+        local = np.zeros((len(nodes), model.continuum.gdim))
+        local[order] = _turned(frames[order], pulls @ tips.frame[i].T)
+        free = index >= 0
+        jump = _released(model, index, free, local, frames)[order] @ tips.frame[i]
+        if not opens(pulls[None, :, 0], jump[None, :, 0])[0]:
+            free[:, 0] = False  # pressed together: it stays closed, shear alone is released
+            jump = _released(model, index, free, local, frames)[order] @ tips.frame[i]
+        out[i, : len(nodes)] = jump
     return out
 
 
@@ -106,14 +97,17 @@ def _turned(frames: Array, vectors: Array) -> Array:
     return np.asarray(np.einsum("kci,kc->ki", frames, vectors[:, : frames.shape[1]]))
 
 
-def _released(model: WindowModel, index: Ints, free: npt.NDArray[np.bool_], force: Array) -> Array:
-    """Jumps of a unit without some of its bonds, in local frames.
+def _released(
+    model: WindowModel, index: Ints, free: npt.NDArray[np.bool_], force: Array, frames: Array
+) -> Array:
+    """Jumps of a unit without some of its bonds, global vectors of shape (k, 3).
 
     Args:
         model: The model.
         index: Components in the window, shape (k, gdim).
         free: Those let go, likewise.
-        force: Their bond forces, likewise.
+        force: Their bond forces in local frames, likewise.
+        frames: These, shape (k, gdim, gdim).
     """
     jump = np.zeros(index.shape)
     star = model.system.reduced(index[free])
@@ -122,4 +116,6 @@ def _released(model: WindowModel, index: Ints, free: npt.NDArray[np.bool_], forc
     except NotPositiveDefinite:
         factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
     jump[free] = cho_solve((factor, True), force[free])
-    return jump
+    world = np.zeros((len(index), 3))
+    world[:, : index.shape[1]] = np.einsum("kci,ki->kc", frames, jump)
+    return world

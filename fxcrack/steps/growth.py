@@ -73,6 +73,11 @@ class Debond:
         name, law = type(self.criterion).__name__, type(self.release).__name__
         if not isinstance(self.criterion, Criterion):
             raise InputError(f"{where}: {name} is not a criterion; give VCCT or another of them")
+        if not hasattr(self.release, "driver") or isinstance(self.release, type):
+            raise InputError(
+                f"{where}: release = {self.release!r} is no release law; give Step(), "
+                "Progressive(), OpeningRamp() or AmplitudeRelease(...)"
+            )
         if not isinstance(self.criterion, RateCriterion):
             if not isinstance(self.release, Step | AmplitudeRelease):
                 raise InputError(

@@ -25,7 +25,8 @@ class Static:
         opening: With stepping="opening", the name of the monitor that is controlled, or of two of
             which it is the first less the second, e.g. both faces at the crack mouth. It must grow
             with the load.
-        initial: First increment, in time. Increment stepping only, as all below.
+        initial: First increment, in time; ``maximum`` if that is smaller than the default.
+            Increment stepping only, as all below but ``maximum`` (nonlinear bodies heed it always).
         minimum: Smallest increment; needing less ends the step.
         maximum: Largest increment.
         growth: Factor on the increment after an accepted one.
@@ -65,6 +66,8 @@ class Static:
             raise InputError(
                 f"opening = {self.opening!r}: give the name of one monitor, or a pair of names"
             )
+        if self.initial == Static.initial and 0.0 < self.maximum < self.initial:
+            object.__setattr__(self, "initial", self.maximum)
         if not 0.0 < self.minimum <= self.initial <= self.maximum:
             raise InputError(
                 f"increments must satisfy 0 < minimum <= initial <= maximum, "
