@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fxcrack.errors import ConvergenceError, SolverError
+from fxcrack.errors import ConvergenceError, InputError, SolverError
 from fxcrack.solve.cholesky import NotPositiveDefinite
 from fxcrack.solve.petsc_schur import mumps_message
 
@@ -64,11 +64,23 @@ class NewtonOptions:
         max_iterations: Iterations with a new tangent allowed in one solve.
         reuse: Iterate with the tangent at hand as long as the residual falls fast with it; else
             every iteration has its own (Newton's method to the letter, quadratic at the end).
+        balance: Part of the stored energy by which work and energies may be off after one
+            increment; where it is more the increment is divided, down to 1/512 of it. inf takes
+            every increment whole. For bodies that store all work.
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 25
     reuse: bool = True
+    balance: float = 1e-5
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not (self.tolerance > 0.0 and self.max_iterations >= 1 and self.balance > 0.0):
+            raise InputError(
+                f"NewtonOptions: tolerance = {self.tolerance}, max_iterations = "
+                f"{self.max_iterations} and balance = {self.balance} must be positive"
+            )
 
 
 @dataclass

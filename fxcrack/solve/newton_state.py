@@ -33,7 +33,8 @@ def take_bodies(model: NewtonModel) -> Arrays:
         out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
     out["conjugate"] = model.state.conjugate
     out |= {f"dense.{name}": values for name, values in model.dense().items()}
-    out["sums"] = np.array([model.pairing_energy, model.largest_force, model.drift])
+    sums = model.pairing_energy, model.largest_force, model.largest_energy, model.drift
+    out["sums"] = np.array(sums)
     return out
 
 
@@ -56,7 +57,8 @@ def give_bodies(model: NewtonModel, arrays: Arrays, time: float) -> None:
             model.pairs[p] = with_changing(model.pairs[p], master, known)
     bodies = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("bodies.")}
     model.place({name: values.astype(float) for name, values in bodies.items()}, time)
-    model.pairing_energy, model.largest_force, _ = (float(x) for x in arrays["sums"])
+    sums = (float(x) for x in arrays["sums"])
+    model.pairing_energy, model.largest_force, model.largest_energy, _ = sums
 
 
 def give_accepted(model: NewtonModel, arrays: Arrays) -> None:
@@ -79,7 +81,7 @@ def give_accepted(model: NewtonModel, arrays: Arrays) -> None:
         model.take_dense(
             {name: np.asarray(arrays[f"dense.{name}"], dtype=float) for name in model.dense()}
         )
-        model.drift = float(arrays["sums"][2])
+        model.drift = float(arrays["sums"][3])
 
 
 __all__ = ["give_accepted", "give_bodies", "take_bodies"]

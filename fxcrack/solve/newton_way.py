@@ -47,6 +47,14 @@ class Move:
     bonds: float
     friction: float
 
+    def external_work(self, n_forces: int) -> float:
+        """Work of supports and force patterns, of which there are ``n_forces``."""
+        n, a, b = len(self.start.loads) - n_forces, self.start.loads, self.end.loads
+        work = self.conjugate[:n] @ (b - a)[:n]
+        work += b[n:] @ self.end.conjugate[n:] - a[n:] @ self.start.conjugate[n:]
+        work -= self.conjugate[n:] @ (b - a)[n:]
+        return float(work)
+
 
 @dataclass(frozen=True)
 class Way:

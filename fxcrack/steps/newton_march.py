@@ -13,6 +13,7 @@ from fxcrack import log
 from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.newton_model import NewtonModel
+from fxcrack.solve.newton_way import OffBalance
 from fxcrack.steps.evaluate import TipValues
 from fxcrack.steps.increments import TooManyCutbacks
 from fxcrack.steps.march import March
@@ -21,6 +22,8 @@ _AT_ONE = 1e-9
 """How near to 1 the criterion must be at an onset."""
 _MANY = 30
 """Times it is looked for on the way back; round-off of f may keep it farther off than that."""
+_FINE = 1.0 / 512.0
+"""Part of a way that is taken at once whatever the energies are."""
 _NO_WAY = 4e-16
 """Part of the time below which no way is made."""
 _SMALLEST = 1e-6
@@ -61,7 +64,7 @@ class NewtonMarch(March):
         whole = abs(target - self.time)
         size = self.step.maximum
         beyond: tuple[float, float] | None = None
-        idle = 0
+        idle, strict = 0, True
         while True:
             if self._renew():
                 beyond = None  # with other pairs f was another one there
@@ -70,10 +73,11 @@ class NewtonMarch(March):
             guess = self._predicted(begin + way, upward=upward)
             if beyond is not None:
                 guess = self._secant(beyond, guess)
+                guess = begin + min(max(guess - begin, -size), size)
             saved = self.model.system.snapshot()
             here = self.model.state
             try:
-                point, values = self._try(guess)
+                point, values = self._try(guess, strict=strict)
                 level = _largest(values)
                 off = level - 1.0 if upward else 1.0 - level
                 crossed = off > _AT_ONE and abs(guess - begin) > _SMALLEST * _AT_ONE * whole
@@ -82,13 +86,19 @@ class NewtonMarch(March):
                     beyond = (guess, level)
                     continue
                 if not self.model.exact:
-                    self.model.confirm()
+                    self.model.confirm(strict=strict)
+            except OffBalance as error:
+                size = 0.5 * abs(guess - begin)
+                strict = size > _FINE * whole
+                log.info("cut back to an increment of %g: %s", size, error)
+                continue
             except ConvergenceError as error:
                 size = 0.25 * abs(guess - begin)
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
+            strict = True
             before, self._values = max(self._largest()), values
             self._advance(here, point, guess)
             self.model.accept()
@@ -115,11 +125,14 @@ class NewtonMarch(March):
         remembers = bodies.path_dependent or system.soft.bonds or self._ramps
         return not (remembers or system.friction is not None or self.model.follows_sliding)
 
-    def _try(self, time: float) -> tuple[Equilibrium, list[TipValues]]:
+    def _try(self, at: float, *, strict: bool = False) -> tuple[Equilibrium, list[TipValues]]:
         """The equilibrium at a time, a trial, and the criteria there."""
-        loads, force = self.loads_at(time), self._force_at(time)
-        point = self.model.move(loads, force, time, time - self.time, confirm=self.model.exact)
-        return point, self._evaluate_at(point, time)
+        point = self._move(at, confirm=self.model.exact, strict=strict)
+        return point, self._evaluate_at(point, at)
+
+    def _move(self, at: float, **options: bool) -> Equilibrium:
+        loads, force = self.loads_at(at), self._force_at(at)
+        return self.model.move(loads, force, at, at - self.time, **options)
 
     def _back_to_one(self, other: tuple[float, float]) -> None:
         """From beyond f = 1 to where it is, along the way that led here.
@@ -160,9 +173,8 @@ class NewtonMarch(March):
             if value > 0.0 and begin <= 0.0:
                 return False
             guess = self._zero(excess, value, max(begin - size, 0.0) if value > 0.0 else back)
-            loads, force = self.loads_at(guess), self._force_at(guess)
             try:
-                point = self.model.move(loads, force, guess, guess - begin)
+                point = self._move(guess)
             except ConvergenceError as error:
                 size = 0.25 * abs(guess - begin)
                 if size < _SMALLEST * whole:
@@ -236,8 +248,25 @@ class NewtonMarch(March):
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
         self._renew()
-        loads, force = self.loads_at(target), self._force_at(target)
-        return [(1.0, self.model.move(loads, force, target, target - self.time))]
+        return [(1.0, self._approach(target, _FINE * abs(target - self.time)))]
+
+    def _approach(self, target: float, least: float) -> Equilibrium:
+        """A trial at a time; where energies of the way do not add up, half of it is gone first.
+
+        Args:
+            target: Time of the trial.
+            least: Ways in time that are taken whatever their energies are.
+        """
+        try:
+            return self._move(target, strict=abs(target - self.time) > least)
+        except OffBalance as error:
+            log.info("half of an increment first: %s", error)
+        middle = 0.5 * (self.time + target)
+        point = self._approach(middle, least)
+        self._advance(self.model.state, point, middle)
+        self.model.accept()
+        self._renew()
+        return self._approach(target, least)
 
 
 def _largest(values: list[TipValues]) -> float:

@@ -32,6 +32,7 @@ class Term:
         finite: Whether bodies may turn and stretch by any amount.
         dynamic: Whether its forces depend on how long an increment takes.
         path_dependent: Whether its stress depends on how the bodies came here.
+        closed: Whether it stores all the work it takes, and takes no other than that of loads.
         energy_name: What the balance calls its stored energy; terms of one name are summed.
     """
 
@@ -43,6 +44,7 @@ class Term:
     finite: bool = False
     dynamic: bool = False
     path_dependent: bool = False
+    closed: bool = True
 
     def energy(self, u: fem.Function) -> Any:
         """Stored energy as a UFL form, ``None`` if it stores none."""
@@ -109,6 +111,7 @@ class StoringTerm(Term):
             from fxcrack.terms.thermal import ThermalWork
 
             self._thermal = ThermalWork(continuum, self.energy)
+            self.closed = False
 
     def begin(self, time: float, dt: float) -> None:
         """Set the temperature at the end of the increment."""

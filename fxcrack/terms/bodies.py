@@ -77,6 +77,11 @@ class Bodies:
         return any(t.dynamic for t in self.terms)
 
     @property
+    def closed(self) -> bool:
+        """Whether all work on the bodies is stored, but for what interfaces take."""
+        return all(t.closed for t in self.terms)
+
+    @property
     def path_dependent(self) -> bool:
         """Whether stresses depend on how the bodies came here."""
         return any(t.path_dependent for t in self.terms)

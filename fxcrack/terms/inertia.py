@@ -49,6 +49,7 @@ class InertiaForces(Term):
     """
 
     name = "inertia"
+    closed = False
     constant = True
     dynamic = True
     energy_name = "kinetic_energy"

@@ -43,6 +43,7 @@ class Plasticity(Term):
 
     name = "plasticity"
     path_dependent = True
+    closed = False
 
     def __init__(self, continuum: Continuum) -> None:
         if isinstance(continuum.model, PlaneStress):

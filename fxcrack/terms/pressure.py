@@ -35,6 +35,7 @@ class FollowerPressure(Term):
     """
 
     symmetric = False
+    closed = False
 
     def __init__(self, continuum: Continuum, load: Pressure) -> None:
         self.name = f"follower pressure '{load.title}'"
