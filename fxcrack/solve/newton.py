@@ -35,7 +35,9 @@ _CRAWLS = 0.9
 """A shortened step that leaves more of the residual than this makes way for whole ones: in slender
 bodies they lead through larger residuals (of stretching) to the end (of bending)."""
 _ASTRAY = 10.0
-"""Whole steps have lost their way where the residual is this many times the first one."""
+"""Whole steps have lost their way where the residual is this many times the one at their start or
+after the first of them: the first may be the only one that knows of a new pressure or temperature.
+"""
 
 REASONS = {
     -1: "the function left its domain",
@@ -142,6 +144,7 @@ class InterfaceProblem:
         self._reused = 0
         self.whole = False
         """Whether steps are taken whole, whatever the residual does meanwhile."""
+        self._limit = 0.0  # for their residual
         self.patient = False
         """Whether slow progress of shortened steps is put up with."""
 
@@ -241,8 +244,9 @@ class InterfaceProblem:
         if its - self._reused >= self.model.newton.max_iterations:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)
         if self.whole:
-            astray = norm > _ASTRAY * self.norms[0]
-            return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL) if astray else 0
+            if its <= 1:
+                self._limit = _ASTRAY * max(self.norms[0], norm)
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL) if norm > self._limit else 0
         slow = its > 0 and self.fraction != 1.0 and norm > _CRAWLS * self.norms[-2]
         if slow and not self.patient:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)

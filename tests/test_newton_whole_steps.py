@@ -1,0 +1,62 @@
+"""Whole Newton steps where shortened ones crawl: pressures that follow thin arms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from mpi4py import MPI
+from specimens import HELD_FAR, dcb, onsets, specimen
+
+import fxcrack as fx
+from fxcrack.effects import FiniteStrain
+from fxcrack.errors import ConvergenceError
+from fxcrack.meshes.dcb import dcb_2d
+from fxcrack.output.history import Row
+
+
+def inflated(maximum: float) -> tuple[fx.Scene, Row]:
+    """Thin arms blown apart by a pressure that follows them; the scene and its first onset."""
+
+    def pressure(x: np.ndarray) -> np.ndarray:
+        return np.where(x[0] < 10.0, 0.1, 0.0)
+
+    faces = ("upper_face", "lower_face")
+    scene = specimen(
+        dcb_2d(length=14.0, height=0.1, dx=0.5, ny=1, order=2),
+        a0=10.0,
+        criterion=fx.VCCT(GIc=0.3),
+        supports=HELD_FAR,
+        loads=[fx.Pressure(face, pressure, follows=True) for face in faces],
+        effects=[FiniteStrain()],
+    )
+    history = scene.run(fx.Static(until=fx.Releases(1), maximum=maximum))
+    return scene, onsets(history)[0]
+
+
+def test_follower_pressure_in_one_increment_or_in_many() -> None:
+    """The first whole step alone knows of the new pressure; a failed trial leaves none behind."""
+    (one, coarse), (_, fine) = inflated(1.0), inflated(0.05)
+    assert one.model.counts.failures <= 1
+    for name in ("time", "GI[bond]", "strain_energy"):
+        assert coarse[name] == pytest.approx(fine[name], rel=1e-6)
+
+
+def test_no_equilibrium_between_here_and_beyond(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the way to f = 1 guessed from a state beyond it has no equilibrium, it is cut."""
+    material = fx.Plastic(70e3, 0.3, yield_stress=300.0)
+    scene = dcb(MPI.COMM_SELF, dx=2.0, ny=2, materials=material)
+    move, calls = type(scene.model).move, []
+
+    def stubborn(model: Any, loads: Any, force: Any, at: float, dt: float, **more: Any) -> Any:
+        calls.append(dt)
+        assert len(calls) < 200
+        if dt > 2.0 and len(calls) > 2:
+            raise ConvergenceError("for the test")
+        return move(model, loads, force, at, dt, **more)
+
+    monkeypatch.setattr(type(scene.model), "move", stubborn)
+    history = scene.run(fx.Static(until=fx.Releases(1), maximum=50.0))
+    assert history.reason == "1 nodes released"
+    assert onsets(history)[0]["f[bond]"] == pytest.approx(1.0, abs=1e-8)
