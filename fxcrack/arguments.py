@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
+from fxcrack import log
 from fxcrack.errors import InputError
 
 
@@ -42,6 +43,19 @@ def one(owner: str, name: str, value: Any, kinds: type | tuple[type, ...], examp
         raise InputError(f"{owner}: {name} = {value.__name__} is a class; make one, e.g. {example}")
     if not isinstance(value, kinds):
         raise InputError(f"{owner}: {name} is {_kind(value)}; give e.g. {example}")
+
+
+def warn_of_same_titles(kind: str, parts: Iterable[Any]) -> None:
+    """Warn of parts that the history would call the same."""
+    titles = [part.title for part in parts]
+    for title in dict.fromkeys(t for t in titles if titles.count(t) > 1):
+        log.warn(
+            "%d %s are called '%s' and the history shows the last of them only; tell them apart by "
+            "name=...",
+            titles.count(title),
+            kind,
+            title,
+        )
 
 
 def check_amplitudes(parts: Iterable[Any]) -> None:

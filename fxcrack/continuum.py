@@ -242,7 +242,20 @@ class Continuum:
             lagrange_variant=basix.LagrangeVariant.legendre,
         )
         function = fem.Function(fem.functionspace(self.mesh.domain, element))
-        function.interpolate(value)
+        if isinstance(value, fem.Function):
+            function.interpolate(value)
+            return function
+
+        def at(x: Array) -> Array:
+            found = np.asarray(value(x), dtype=PETSc.ScalarType)
+            if found.shape not in ((), (x.shape[1],), (1, x.shape[1])):
+                raise InputError(
+                    f"a function of position of a load gives shape {found.shape} at {x.shape[1]} "
+                    "positions x of shape (3, n); return one number per position, shape (n,)"
+                )
+            return np.array(np.broadcast_to(found, (1, x.shape[1]))[0])
+
+        function.interpolate(at)
         return function
 
     def _check_components(self, value: tuple[Field, ...], title: str) -> None:

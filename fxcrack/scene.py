@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fxcrack import log
 from fxcrack.accuracy.estimate import as_details, check_accuracy, demand
-from fxcrack.arguments import check_amplitudes, one, several
+from fxcrack.arguments import check_amplitudes, one, several, warn_of_same_titles
 from fxcrack.continuum import Continuum
 from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.errors import InputError
@@ -97,9 +97,11 @@ class Scene:
         supports = several("Scene", "supports", supports, Displacement)
         loads = several("Scene", "loads", loads, (Traction, Pressure, BodyForce, PointForce))
         check_amplitudes([*supports, *loads])
+        warn_of_same_titles("loads", loads)
         debonds = several("Scene", "debonds", debonds, Debond)
         bonds = several("Scene", "bonds", bonds, Interface)
         monitors = several("Scene", "monitors", monitors, Monitor)
+        warn_of_same_titles("monitors", monitors)
         if newton is not None:
             one("Scene", "newton", newton, NewtonOptions, "NewtonOptions(max_iterations=40)")
         if options is not None:

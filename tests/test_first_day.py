@@ -106,3 +106,42 @@ def test_loads_of_the_wrong_sign(comm: MPI.Comm, caplog: pytest.LogCaptureFixtur
     )
     assert history.rows[-1]["f[bond]"] == 0.0
     assert "or check the sign of the loads" in caplog.text
+
+
+def test_classes_where_their_instances_belong() -> None:
+    with pytest.raises(fx.InputError, match="is no mode-mix law; give one with its exponents"):
+        fx.VCCT(GIc=0.2, GIIc=0.5, mix=fx.BK)
+    with pytest.raises(fx.InputError, match=r"interface 'bond': release = .*is no release law"):
+        fx.Debond(bond(30.0), fx.VCCT(GIc=0.2), fx.Progressive)
+
+
+def test_bonded_by_a_chain_of_comparisons(comm: MPI.Comm) -> None:
+    chain = fx.Interface("upper_face", "lower_face", bonded=lambda x: 30.0 <= x[0] <= 50.0)
+    with pytest.raises(fx.InputError, match=r"function bonded fails: .*join conditions by & or"):
+        specimen(mesh(comm), interface=chain)
+
+
+@pytest.mark.mpi
+def test_pressure_by_functions(comm: MPI.Comm) -> None:
+    def loads(value: object) -> list[fx.Pressure]:
+        return [fx.Pressure("upper_face", value), fx.Pressure("lower_face", value)]
+
+    values = 1.0, lambda x: 1.0, lambda x: np.ones(x.shape[1])
+    times = []
+    for value in values:
+        history = specimen(mesh(comm), supports=HELD_FAR, loads=loads(value)).run(
+            fx.Static(until=fx.Releases(1))
+        )
+        times.append(history.rows[-1]["time"])
+    assert times[0] == pytest.approx(times[1], rel=1e-12) == pytest.approx(times[2], rel=1e-12)
+    with pytest.raises(fx.InputError, match=r"gives shape \(4,\) at .* one number per position"):
+        specimen(mesh(comm), supports=HELD_FAR, loads=loads(lambda x: np.ones(4))).run(
+            fx.Static(until=fx.Releases(1))
+        )
+
+
+def test_columns_of_one_name(comm: MPI.Comm, caplog: pytest.LogCaptureFixture) -> None:
+    ways = [fx.Monitor("pin_top", (0.0, 1.0)), fx.Monitor("pin_top", (1.0, 0.0))]
+    specimen(mesh(comm), supports=HELD_FAR, loads=[*FORCES, FORCES[0]], monitors=ways)
+    assert "2 loads are called 'pin_top'" in caplog.text
+    assert "2 monitors are called 'u_pin_top'" in caplog.text

@@ -51,6 +51,11 @@ class RateCriterion:
         not_negative(self._owner, tolerance=self.tolerance)
         one_of(self._owner, "method", self.method, ("vcct", "closure"))
         one_of(self._owner, "normalisation", self.normalisation, NORMALISATIONS)
+        if self.mix is not None and (isinstance(self.mix, type) or not hasattr(self.mix, "ratio")):
+            raise InputError(
+                f"{self._owner}: mix = {self.mix!r} is no mode-mix law; give one with its "
+                "exponents, BK(eta=...), Reeder(eta=...) or Power(am=..., an=...)"
+            )
         if self.mix is None and not (self.GIIc is None and self.GIIIc is None):
             raise InputError(
                 f"{self._owner}: GIIc or GIIIc is given but no mode-mix law; "

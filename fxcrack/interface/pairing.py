@@ -229,7 +229,13 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
             log.warn("%s; they are ignored", found)
         return np.asarray(np.isin(surface.dofs, named))
     if callable(chosen):
-        marks = np.asarray(chosen(np.ascontiguousarray(surface.x.T)))
+        try:
+            marks = np.asarray(chosen(np.ascontiguousarray(surface.x.T)))
+        except Exception as error:  # whatever the user's function may raise
+            raise InterfaceError(
+                f"{where}: the function bonded fails: {error}; it gets positions x of shape (3, n) "
+                "and returns n booleans; join conditions by & or |, each in brackets"
+            ) from error
     else:
         marks = np.asarray(chosen)
     if marks.shape != (surface.n_nodes,):
