@@ -135,7 +135,8 @@ class InterfaceProblem:
         self._residual: PETSc.Vec | None = None
         self.norms: list[float] = []
         """Residuals so far, force."""
-        self._level = 0.0  # the norm at which the iteration ends
+        self.level = 0.0
+        """The norm at which the iteration ends."""
         self._steps_since = 0  # with the present tangent
         self.drift = 0.0
         """What was out of balance where the last tangent was made, over the forces."""
@@ -159,7 +160,7 @@ class InterfaceProblem:
             return True
         if not self.model.bodies.symmetric:
             return False  # S is that of the symmetric part: another one is no better
-        return float(np.log(self._level / self.norms[-1])) < _MANY * float(np.log(rate))
+        return float(np.log(self.level / self.norms[-1])) < _MANY * float(np.log(rate))
 
     def residual(self, snes: Any, y: PETSc.Vec, out: PETSc.Vec) -> None:
         """T^t r(u) minus the interface forces that belong to y."""
@@ -236,7 +237,7 @@ class InterfaceProblem:
             self.model.newton.tolerance * max(self.scale, forces), self.model.round_off, round_off
         )
         self.norms.append(norm)
-        self._level = level
+        self.level = level
         if its == 0:
             self.drift = norm / self.scale if norm > level else 0.0
         if norm <= level and self.fraction == 1.0:

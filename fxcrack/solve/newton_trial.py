@@ -28,6 +28,8 @@ Array = npt.NDArray[np.float64]
 _FAR_OFF = 1e-5
 """A tangent made where more than this part of the forces was out of balance gives way to that of
 the state itself when one is accepted."""
+_NOISE = 10.0
+"""Energies on a way may be off by so many times the residual left times the step."""
 _UNSTABLE = (
     "the equilibrium found is unstable (buckling, or a limit load was passed); take smaller "
     "increments, or control a displacement instead of a force"
@@ -52,6 +54,7 @@ class TrialModel(TangentModel):
         self._trial_drift = 0.0
         self._stored: float | None = None  # in the accepted state, where that is known
         self._trial_stored: float | None = None
+        self._noise = 0.0  # of the energies on the way to the trial
         self.largest_energy = 0.0
         self._answers = np.zeros(0)  # forces of the last coordinates at the trial's end
         self._way: Way | None = None  # to a trial that is not confirmed yet
@@ -175,7 +178,7 @@ class TrialModel(TangentModel):
         taken = move.bonds + move.friction
         off = move.external_work(len(self.loads)) - (self._trial_stored - self._stored) - taken
         size = max(self._trial_stored, self.largest_energy)
-        if abs(off) > self.newton.balance * size:
+        if abs(off) > self.newton.balance * size + self._noise:
             self.reject(saved)
             raise OffBalance(
                 f"the energies of an increment are off by {off:.2e} beside {size:.2e} stored"
@@ -203,6 +206,8 @@ class TrialModel(TangentModel):
         self._through(end)
         trial = self.coordinates.transform.createVecLeft()
         self.coordinates.transform.mult(y, trial)
+        # forces are known to what the iteration leaves out of balance, and so is their work
+        self._noise = _NOISE * problem.level * float(trial.norm())
         trial.axpy(1.0, self.u)
         if self._trial is not None:
             self._trial.destroy()
