@@ -219,7 +219,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     ),
     "plastic": (
         yielding,
-        [fx.Static(until=fx.Time(3.0), initial=0.1, maximum=0.1, **INCREMENTS)],
+        [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
     ),
     "plastic, short": (
         yielding,
@@ -233,7 +233,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         lambda comm: bent(
             comm, effects=[fx.FiniteStrain(), fx.Inertia(density=1e-5, rayleigh=(0.0, 1e-3))]
         ),
-        [fx.Dynamic(until=fx.Time(3.0), dt=0.1)],
+        [fx.Dynamic(until=fx.Time(3.0), dt=0.2)],
     ),
     "pressure that follows, temperature": (
         lambda comm: bent(
@@ -249,7 +249,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
                 fx.Temperature([(0.0, 0.0), (4.0, lambda x: 50.0 + x[0])]),
             ],
         ),
-        [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
+        [fx.Static(until=fx.Time(3.0), initial=0.4, maximum=0.4, **INCREMENTS)],
     ),
     "fatigue": (fatigue, [fx.Cycles(maximum=0.5, ratio=0.1, until=fx.Releases(6))]),
     "fatigue in two steps": (
