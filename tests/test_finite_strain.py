@@ -33,6 +33,29 @@ def pinned(name: str, x: float, y: float, angle: float, opening: float) -> list[
     ]
 
 
+def test_shear_of_a_pressed_unit_in_a_turned_specimen() -> None:
+    """What exact closure holds is the normal of the turned faces."""
+
+    def run(angle: float) -> dict[str, Any]:
+        scene = specimen(
+            dcb_2d(length=40.0, dx=2.0, ny=2),
+            a0=20.0,
+            criterion=fx.VCCT(GIc=1e3, method="closure"),
+            materials={"upper": STEEL, "lower": fx.Isotropic(7e3, 0.3)},
+            supports=[
+                *pinned("pin_top", 0.0, 1.5, angle, -1.0),
+                *pinned("pin_bottom", 0.0, -1.5, angle, 1.0),
+            ],
+            effects=[FiniteStrain()],
+        )
+        return scene.run(fx.Static(until=fx.Time(2.0)))[-1]
+
+    at_rest, turned = run(0.0), run(np.radians(80.0))
+    assert at_rest["GI[bond]"] == turned["GI[bond]"] == 0.0
+    assert at_rest["GII[bond]"] > 1e-4
+    assert turned["GII[bond]"] == pytest.approx(at_rest["GII[bond]"], rel=1e-6)
+
+
 @pytest.mark.parametrize("degrees", [80.0, 170.0])
 @pytest.mark.parametrize(
     ("criterion", "quantities"),

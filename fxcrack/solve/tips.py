@@ -86,8 +86,9 @@ def closure_jumps(model: WindowModel, p: int, tips: Tips, force: Array) -> Array
         free = index >= 0
         jump = _released(model, index, free, local, frames)[order] @ tips.frame[i]
         if not opens(pulls[None, :, 0], jump[None, :, 0])[0]:
-            free[:, 0] = False  # pressed together: it stays closed, shear alone is released
-            jump = _released(model, index, free, local, frames)[order] @ tips.frame[i]
+            # pressed together: it stays closed, shear alone is released
+            jump = _released(model, index, free, local, frames, tips.frame[i][:, 0])
+            jump = jump[order] @ tips.frame[i]
         out[i, : len(nodes)] = jump
     return out
 
@@ -98,7 +99,12 @@ def _turned(frames: Array, vectors: Array) -> Array:
 
 
 def _released(
-    model: WindowModel, index: Ints, free: npt.NDArray[np.bool_], force: Array, frames: Array
+    model: WindowModel,
+    index: Ints,
+    free: npt.NDArray[np.bool_],
+    force: Array,
+    frames: Array,
+    normal: Array | None = None,
 ) -> Array:
     """Jumps of a unit without some of its bonds, global vectors of shape (k, 3).
 
@@ -108,14 +114,26 @@ def _released(
         free: Those let go, likewise.
         force: Their bond forces in local frames, likewise.
         frames: These, shape (k, gdim, gdim).
+        normal: Direction, shape (3,), in which nothing moves, be it none of the local frames' (they
+            do not turn with the bodies); ``None`` for none.
     """
     jump = np.zeros(index.shape)
     star = model.system.reduced(index[free])
     try:
         factor = model.system.cholesky.factorise(star, index[free])
     except NotPositiveDefinite:
+        if normal is not None:
+            tangential = free & (np.arange(index.shape[1]) > 0)
+            return _released(model, index, tangential, force, frames)
         factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
     jump[free] = cho_solve((factor, True), force[free])
+    if normal is not None:
+        k = len(index)
+        across = np.zeros((*index.shape, k))
+        across[range(k), :, range(k)] = np.einsum("kci,c->ki", frames, normal[: frames.shape[1]])
+        held = across[free]
+        given = cho_solve((factor, True), held)
+        jump[free] -= given @ np.linalg.lstsq(held.T @ given, held.T @ jump[free])[0]
     world = np.zeros((len(index), 3))
     world[:, : index.shape[1]] = np.einsum("kci,ki->kc", frames, jump)
     return world
