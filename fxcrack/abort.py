@@ -18,6 +18,9 @@ from fxcrack.interrupt import Interrupted
 PATIENCE = 3.0
 """Seconds an interrupted rank waits for the others."""
 
+_HAND_ON = 0.5
+"""Seconds mpiexec gets to hand on what was written: an abort may overtake it."""
+
 _ordinary = sys.excepthook
 
 
@@ -32,28 +35,33 @@ def all_arrive(comm: MPI.Intracomm, patience: float) -> bool:
     return True
 
 
+def end_all(comm: MPI.Intracomm, code: int) -> None:
+    """End all ranks, once what was written has had time to arrive."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    time.sleep(_HAND_ON)
+    comm.Abort(code)
+
+
 def _abort(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
     """Print the error and end all ranks."""
     comm = MPI.COMM_WORLD
     sys.stdout.flush()
     if isinstance(error, Interrupted):
         if comm.rank == 0:
-            sys.stderr.write(f"fxcrack: {error}\n")
-            sys.stderr.flush()
+            print(f"fxcrack: {error}", file=sys.stderr, flush=True)
         if comm.size > 1 and not all_arrive(comm, PATIENCE):
-            comm.Abort(error.code)
+            end_all(comm, error.code)
         raise SystemExit(error.code)
     if comm.size == 1:
         _ordinary(kind, error, trace)
         return
     if kind is KeyboardInterrupt:
         sys.stderr.write(f"rank {comm.rank} of {comm.size}: interrupted\n")
-        sys.stderr.flush()
-        comm.Abort(130)
+        end_all(comm, 130)
     text = "".join(traceback.format_exception(kind, error, trace))
     sys.stderr.write(f"rank {comm.rank} of {comm.size}:\n{text}")
-    sys.stderr.flush()
-    comm.Abort(1)
+    end_all(comm, 1)
 
 
 def install() -> None:

@@ -32,7 +32,7 @@ from rich.table import Table
 from typer.main import get_command
 
 from fxcrack import log
-from fxcrack.abort import all_arrive
+from fxcrack.abort import all_arrive, end_all
 from fxcrack.bench.problem import NAMES, Problem
 from fxcrack.errors import FxcrackError, InputError
 from fxcrack.interrupt import Interrupted
@@ -365,7 +365,7 @@ def main(argv: Sequence[str] | None = None) -> None:
         if message and (comm.rank == 0 or not together):
             print(message, file=sys.stderr, flush=True)
         if not together:
-            comm.Abort(code if isinstance(code, int) else 1)
+            end_all(comm, code if isinstance(code, int) else 1)
     comm.Free()
     sys.exit(code)
 

@@ -26,6 +26,8 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from fxcrack.abort import end_all
+
 # Same examples on every rank and in every run; compilation of forms makes first examples slow.
 hypothesis.settings.register_profile("fxcrack", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("fxcrack")
@@ -76,8 +78,7 @@ def _wait_for_all(item: pytest.Item, report: pytest.TestReport) -> None:
             ).global_and_fixture_disabled():
                 print(f"\n{item.nodeid} failed on rank {WORLD.rank}, others hang", file=sys.stderr)
                 print(report.longreprtext, file=sys.stderr, flush=True)
-            time.sleep(0.5)  # what is printed must leave the process before mpirun ends it
-            WORLD.Abort(1)
+            end_all(WORLD, 1)
         time.sleep(0.001)  # leave the core to ranks that still work
 
 

@@ -24,6 +24,7 @@ from typing import Any
 import fxcrack  # isort: skip  (orders MPI before DOLFINx)
 from mpi4py import MPI
 
+from fxcrack.abort import all_arrive
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.study import Setting, Study
 from fxcrack.bench.measure import peak_memory, slowest
@@ -159,17 +160,6 @@ def _next(comm: MPI.Intracomm, parent: int) -> dict[str, Any] | None:
     return received
 
 
-def _all_failed(comm: MPI.Intracomm) -> bool:
-    """Whether every rank gets here before long: one that has not failed may wait for this one."""
-    met = comm.Ibarrier()
-    deadline = time.monotonic() + _PATIENCE
-    while not met.Test():
-        if time.monotonic() > deadline:
-            return False
-        time.sleep(_NAP)
-    return True
-
-
 def main() -> None:
     """Serve until the input ends.
 
@@ -193,10 +183,10 @@ def main() -> None:
             answer = {"result": run(study, Setting(**request), comm)}
         except Exception as error:  # a scene function may raise anything: the study goes on
             answer = {"error": f"{type(error).__name__}: {error}"}
-        if comm.rank == 0 or ("error" in answer and not _all_failed(failures)):
+        if comm.rank == 0 or ("error" in answer and not all_arrive(failures, _PATIENCE)):
             print(MARK + json.dumps(answer), file=answers, flush=True)
         if comm.rank == 0 and "error" in answer:
-            torn = not _all_failed(failures)
+            torn = not all_arrive(failures, _PATIENCE)
         gc.collect()
     if torn:
         comm.Abort(1)
