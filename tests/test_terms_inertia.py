@@ -285,7 +285,7 @@ def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     effect = with_velocity(fx.Inertia(rayleigh=(0.1, 0.0)))
     first, second = moving(comm, effect), moving(comm, effect)
     march(first, 0.1, 5)
-    second.restore(first.state())
+    second.restore(comm.bcast(first.state()))
     a, b = march(first, 0.07, 3), march(second, 0.07, 3)
     assert a == pytest.approx(b, rel=1e-12)
     assert first.spent() == pytest.approx(second.spent(), rel=1e-10)

@@ -140,7 +140,7 @@ def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
 
     first, second = make(), make()
     step(first, 0.5)
-    second.restore(first.state())
+    second.restore(comm.bcast(first.state()))
     for b in (first, second):
         step(b, 1.0)
     assert second.work() == pytest.approx(first.work(), rel=1e-13)

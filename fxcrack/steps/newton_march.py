@@ -20,8 +20,10 @@ from fxcrack.steps.march import March
 
 _AT_ONE = 1e-9
 """How near to 1 the criterion must be at an onset."""
+_NEAR_ONE = 1e-7
+"""How near to 1 the iteration's own tolerance may leave f, where it no longer comes nearer."""
 _MANY = 30
-"""Times it is looked for on the way back; round-off of f may keep it farther off than that."""
+"""Times f = 1 is looked for on the way back."""
 _FINE = 1.0 / 512.0
 """Part of a way that is taken at once whatever the energies are."""
 _NO_WAY = 4e-16
@@ -160,8 +162,11 @@ class NewtonMarch(March):
             self._values = values
             self._advance(here, point, guess)
             self.model.accept()
-            if (begin[1] - 1.0) * (_largest(values) - 1.0) < 0.0:
+            after = _largest(values)
+            if (level - 1.0) * (after - 1.0) < 0.0:
                 other = begin
+            if abs(after - 1.0) < _NEAR_ONE and abs(after - 1.0) > 0.5 * abs(level - 1.0):
+                return  # nearer than the iteration can tell
 
     def _unload_until(self, excess: Callable[[Equilibrium], float], close: float) -> bool:
         whole, size, back = self.time, self.step.maximum, self.time
