@@ -68,7 +68,7 @@ class NewtonOptions:
             every iteration has its own (Newton's method to the letter, quadratic at the end).
         balance: Part of the stored energy by which work and energies may be off after one
             increment; where it is more the increment is divided, down to 1/512 of it. inf takes
-            every increment whole. For bodies that store all work.
+            every increment whole. Not for plasticity and inertia, which count otherwise.
     """
 
     tolerance: float = 1e-10

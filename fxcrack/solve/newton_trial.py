@@ -176,7 +176,8 @@ class TrialModel(TangentModel):
         assert self._stored is not None
         self._trial_stored = sum(self.bodies.stored().values())
         taken = move.bonds + move.friction
-        off = move.external_work(len(self.loads)) - (self._trial_stored - self._stored) - taken
+        given = move.external_work(len(self.loads)) + self.bodies.way_work()
+        off = given - (self._trial_stored - self._stored) - taken
         size = max(self._trial_stored, self.largest_energy)
         if abs(off) > self.newton.balance * size + self._noise:
             self.reject(saved)

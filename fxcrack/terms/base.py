@@ -32,7 +32,8 @@ class Term:
         finite: Whether bodies may turn and stretch by any amount.
         dynamic: Whether its forces depend on how long an increment takes.
         path_dependent: Whether its stress depends on how the bodies came here.
-        closed: Whether it stores all the work it takes, and takes no other than that of loads.
+        closed: Whether it stores all the work it takes, that of loads and its own
+            (:meth:`way_work`).
         energy_name: What the balance calls its stored energy; terms of one name are summed.
     """
 
@@ -75,6 +76,10 @@ class Term:
         """Energies turned into something else up to the last commit, by name; collective."""
         return {}
 
+    def way_work(self, u: fem.Function) -> float:
+        """Work it does on the bodies on the straight way from the last commit to u; collective."""
+        return 0.0
+
     def work(self) -> float:
         """Work done on the bodies through the term up to the last commit; collective.
 
@@ -111,7 +116,6 @@ class StoringTerm(Term):
             from fxcrack.terms.thermal import ThermalWork
 
             self._thermal = ThermalWork(continuum, self.energy)
-            self.closed = False
 
     def begin(self, time: float, dt: float) -> None:
         """Set the temperature at the end of the increment."""
@@ -123,6 +127,10 @@ class StoringTerm(Term):
         """Add the work of the temperature."""
         if self._thermal is not None:
             self._thermal.commit(u)
+
+    def way_work(self, u: fem.Function) -> float:
+        """Work of the temperature since the last commit."""
+        return 0.0 if self._thermal is None else float(self._thermal.way_work(u))
 
     def work(self) -> float:
         """Work of the temperature up to the last commit."""

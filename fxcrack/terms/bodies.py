@@ -202,6 +202,10 @@ class Bodies:
                 out[name] = out.get(name, 0.0) + value
         return out
 
+    def way_work(self) -> float:
+        """Work the terms do on the straight way from the last commit to here; collective."""
+        return sum(term.way_work(self.u) for term in self.terms)
+
     def work(self) -> float:
         """Work done on the bodies through the terms up to the last commit; collective."""
         return sum(term.work() for term in self.terms)

@@ -35,7 +35,6 @@ class FollowerPressure(Term):
     """
 
     symmetric = False
-    closed = False
 
     def __init__(self, continuum: Continuum, load: Pressure) -> None:
         self.name = f"follower pressure '{load.title}'"
@@ -66,8 +65,8 @@ class FollowerPressure(Term):
         """Set the pressure at the end of the increment."""
         self._factor.value = self._load.amplitude(time)
 
-    def commit(self, u: fem.Function) -> None:
-        """Add the work along the straight way from the last state; exact, by Simpson's rule.
+    def way_work(self, u: fem.Function) -> float:
+        """Work along the straight way from the last state; exact, by Simpson's rule.
 
         Force and displacement are linear on the way, the deformed area at most quadratic.
         """
@@ -84,9 +83,13 @@ class FollowerPressure(Term):
             factor.value = (1.0 - place) * self._last_factor + place * now
             at.x.array[:] = self._last + place * step.x.array
             work += weight * fem.assemble_scalar(form)
-        self._work += float(c.comm.allreduce(work, op=MPI.SUM))
+        return float(c.comm.allreduce(work, op=MPI.SUM))
+
+    def commit(self, u: fem.Function) -> None:
+        """Add the work along the straight way from the last state."""
+        self._work += self.way_work(u)
         self._last[:] = u.x.array
-        self._last_factor = now
+        self._last_factor = float(self._factor.value)
 
     def work(self) -> float:
         """Work of the pressure up to the last commit; the same on all ranks."""

@@ -57,25 +57,30 @@ class ThermalWork:
         """Set the temperature."""
         self._field.set(time)
 
-    def commit(self, u: fem.Function) -> None:
-        """Add the work since the last commit; collective."""
+    def way_work(self, u: fem.Function) -> float:
+        """Work since the last commit, by the trapezoidal rule; collective."""
         rise = self._field.rise
         now = rise.x.array.copy()
         c = self._continuum
-        if c.comm.allreduce(bool(np.any(now != self._last_rise)), op=MPI.LOR):
-            if self._power is None:
-                at, step = fem.Function(c.space), fem.Function(rise.function_space)
-                self._power = at, step, fem.form(ufl.derivative(self._energy(at), rise, step))
-            at, step, form = self._power
-            step.x.array[:] = now - self._last_rise
-            at.x.array[:] = u.x.array
-            power = fem.assemble_scalar(form)
-            at.x.array[:], rise.x.array[:] = self._last, self._last_rise
-            power += fem.assemble_scalar(form)
-            rise.x.array[:] = now
-            self.work += 0.5 * float(c.comm.allreduce(power, op=MPI.SUM))
+        if not c.comm.allreduce(bool(np.any(now != self._last_rise)), op=MPI.LOR):
+            return 0.0
+        if self._power is None:
+            at, step = fem.Function(c.space), fem.Function(rise.function_space)
+            self._power = at, step, fem.form(ufl.derivative(self._energy(at), rise, step))
+        at, step, form = self._power
+        step.x.array[:] = now - self._last_rise
+        at.x.array[:] = u.x.array
+        power = fem.assemble_scalar(form)
+        at.x.array[:], rise.x.array[:] = self._last, self._last_rise
+        power += fem.assemble_scalar(form)
+        rise.x.array[:] = now
+        return 0.5 * float(c.comm.allreduce(power, op=MPI.SUM))
+
+    def commit(self, u: fem.Function) -> None:
+        """Add the work since the last commit; collective."""
+        self.work += self.way_work(u)
         self._last[:] = u.x.array
-        self._last_rise = now
+        self._last_rise = self._field.rise.x.array.copy()
 
     def state(self) -> dict[str, Array]:
         """Displacement and temperature of the last commit, work so far."""
