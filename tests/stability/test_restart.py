@@ -212,7 +212,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         ),
         [fx.Static(until=fx.Time(1.0))],
     ),
-    "finite strain, event, turning load": (bent, [fx.Static(until=fx.Time(4.0))]),
+    "finite strain, event, turning load": (bent, [fx.Static(until=fx.Time(2.2))]),
     "finite strain, increments, friction": (
         lambda comm: bent(comm, friction=0.3),
         [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
