@@ -108,26 +108,22 @@ class BorderedMatrix:
         else:
             total = sum(parts[1:], parts[0])
         total.sort_indices()
+        structure = tuple(x.astype(PETSc.IntType) for x in (total.indptr, total.indices))
         self.matrix = PETSc.Mat().createAIJ(
-            (shape, shape),
-            csr=(
-                total.indptr.astype(PETSc.IntType),
-                total.indices.astype(PETSc.IntType),
-                total.data,
-            ),
-            comm=stiffness.getComm(),
+            (shape, shape), csr=(*structure, total.data), comm=stiffness.getComm()
         )
         self.matrix.assemble()
         if not renewable:
             inner.destroy()
             return
-        self._inner, self._total = inner, total
+        self._inner, self._structure = inner, structure
         own, all_ = (
             np.repeat(np.arange(shape[0], dtype=np.int64), np.diff(p)) * shape[1] + i
             for p, i in ((indptr, indices), (total.indptr, total.indices))
         )
         self._where = np.searchsorted(all_, own)
-        self._total.data[self._where] -= data  # borders alone
+        self._borders = total.data
+        self._borders[self._where] -= data  # the borders alone are left
 
     def _border_parts(
         self,
@@ -168,11 +164,9 @@ class BorderedMatrix:
             stiffness.ptap(self._transform, result=self.matrix)
             return
         stiffness.ptap(self._transform, result=self._inner)
-        data = self._total.data.copy()
+        data = self._borders.copy()
         data[self._where] += self._inner.getValuesCSR()[2]
-        structure = self._total.indptr, self._total.indices
-        indptr, indices = (x.astype(PETSc.IntType) for x in structure)
-        self.matrix.setValuesCSR(indptr, indices, data)
+        self.matrix.setValuesCSR(*self._structure, data)
         self.matrix.assemble()
 
     def destroy(self) -> None:

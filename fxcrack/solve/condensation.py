@@ -101,11 +101,7 @@ class Condensation:
             SolverError: MUMPS failed; the message says why.
         """
         start = time.perf_counter()
-        if self._inner is not None:
-            self._inner.destroy()
-        if self._inner_matrix is not None:
-            self._inner_matrix.destroy()
-        self._inner = self._inner_matrix = None
+        self._drop_inner()
         self._bordered.renew(stiffness)
         self.diagonal = self._last_diagonal()
         self.timings.add("transform", start)
@@ -331,14 +327,18 @@ class Condensation:
             inner.destroy()
             found.destroy()
 
-    def destroy(self, *, keep_transform: bool = False) -> None:
-        """Free matrices and factors, and T unless it is to be used again; collective."""
-        if self._factor is not None:
-            self._factor.destroy()
+    def _drop_inner(self) -> None:
         if self._inner is not None:
             self._inner.destroy()
         if self._inner_matrix is not None:
             self._inner_matrix.destroy()
+        self._inner = self._inner_matrix = None
+
+    def destroy(self, *, keep_transform: bool = False) -> None:
+        """Free matrices and factors, and T unless it is to be used again; collective."""
+        if self._factor is not None:
+            self._factor.destroy()
+        self._drop_inner()
         self._bordered.destroy()
         if not keep_transform:
             self.coordinates.transform.destroy()

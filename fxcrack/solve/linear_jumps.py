@@ -127,8 +127,7 @@ class LinearJumps:
         """
         if schur is self.schur and self.offset is not None:
             self.offset = offset
-            right = offset[self.cholesky.free]
-            self._forward = np.column_stack([self._forward[:, :-1], self.cholesky.forward(right)])
+            self._forward[:, -1] = self.cholesky.forward(offset[self.cholesky.free])
             return
         free, bonds, old = self.cholesky.free, self.soft.bonds, (self.schur, self.offset)
         try:

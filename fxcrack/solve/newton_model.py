@@ -14,13 +14,11 @@ from petsc4py import PETSc
 from fxcrack.errors import ConvergenceError
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.newton_trial import TrialModel
-from fxcrack.solve.newton_way import OffBalance
+from fxcrack.solve.newton_way import FINE, OffBalance
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
-_FINE = 1.0 / 512.0
-"""Part of a bond force that is taken away at once whatever the energies are."""
 _SMALLEST_PIECE = 1e-4
 """Part of a bond force whose removal is the least that is tried at once."""
 
@@ -58,7 +56,7 @@ class NewtonModel(TrialModel):
             target = force if to == 1.0 else begin + to * (force - begin)
             here = self.state
             try:
-                end = self.move(here.loads, target, self.at, 0.0, strict=size > _FINE)
+                end = self.move(here.loads, target, self.at, 0.0, strict=size > FINE)
             except OffBalance:
                 size *= 0.5
                 continue
@@ -160,7 +158,7 @@ class NewtonModel(TrialModel):
     def recall(self, saved: Any) -> None:
         """Return to an earlier accepted state; ``state`` is the caller's to set before."""
         states, u, terms, books, (pairs, numbers) = saved
-        self._stored = None
+        self._energies = None
         here = min(self.comm.allgather(np.array_equal(self.u.array_r, u)))
         self.u.array[:] = u
         self.at, energy = books

@@ -52,8 +52,8 @@ class TrialModel(TangentModel):
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: PETSc.Vec | None = None
         self._trial_drift = 0.0
-        self._stored: float | None = None  # in the accepted state, where that is known
-        self._trial_stored: float | None = None
+        self._energies: dict[str, float] | None = None  # of the accepted state, once looked at
+        self._trial_energies: dict[str, float] | None = None
         self._noise = 0.0  # of the energies on the way to the trial
         self.largest_energy = 0.0
         self._answers = np.zeros(0)  # forces of the last coordinates at the trial's end
@@ -89,8 +89,8 @@ class TrialModel(TangentModel):
             ConvergenceError: None was found; the accepted state is in force again.
         """
         here = self.state
-        if self._stored is None:
-            self._stored = sum(self.bodies.stored().values())
+        if self.bodies.closed:
+            self.stored(here)
         saved = self.system.snapshot()
         self._trial_at = at
         dynamic = self.bodies.dynamic
@@ -168,17 +168,18 @@ class TrialModel(TangentModel):
         soft = self.system.soft.components
         self.last_move = way.integrals(after, soft, trapezoidal=trapezoidal)
         self._way = None
-        self._trial_stored = None
+        self._trial_energies = None
         if strict and iterations and self.bodies.closed:
             self._check_balance(way.saved, self.last_move)
 
     def _check_balance(self, saved: Snapshot, move: Move) -> None:
-        assert self._stored is not None
-        self._trial_stored = sum(self.bodies.stored().values())
+        assert self._energies is not None
+        self._trial_energies = self.bodies.stored()
+        before, after = (sum(e.values()) for e in (self._energies, self._trial_energies))
         taken = move.bonds + move.friction
         given = move.external_work(len(self.loads)) + self.bodies.way_work()
-        off = given - (self._trial_stored - self._stored) - taken
-        size = max(self._trial_stored, self.largest_energy)
+        off = given - (after - before) - taken
+        size = max(after, self.largest_energy)
         if abs(off) > self.newton.balance * size + self._noise:
             self.reject(saved)
             raise OffBalance(
@@ -231,8 +232,8 @@ class TrialModel(TangentModel):
         self.largest_force = max(self.largest_force, self.force_scale)
         self.drift = self._trial_drift
         self._keep_tangent()
-        self._stored = self._trial_stored
-        self.largest_energy = max(self.largest_energy, self._stored or 0.0)
+        self._energies = self._trial_energies
+        self.largest_energy = max(self.largest_energy, sum((self._energies or {}).values()))
         self.state = self.last_move.end
         self._base = self.state.jump.copy()
         self._account(step)
@@ -251,6 +252,12 @@ class TrialModel(TangentModel):
         """
         self.system.restore(saved)
         self._back()
+
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies in the accepted state, by name; collective."""
+        if self._energies is None:
+            self._energies = super().stored(state)
+        return self._energies
 
     def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
         """External work, energy out through bonds, mean jumps of the last move."""

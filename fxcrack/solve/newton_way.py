@@ -23,6 +23,10 @@ Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 
 
+FINE = 1.0 / 512.0
+"""Part of a way, or of a bond force, that is taken at once whatever the energies are."""
+
+
 class OffBalance(ConvergenceError):
     """The integrals along a way do not add up to what the bodies have stored: it is too long."""
 

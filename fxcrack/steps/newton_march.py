@@ -13,7 +13,7 @@ from fxcrack import log
 from fxcrack.errors import ConvergenceError, InputError
 from fxcrack.solve.jump_system import Equilibrium
 from fxcrack.solve.newton_model import NewtonModel
-from fxcrack.solve.newton_way import OffBalance
+from fxcrack.solve.newton_way import FINE, OffBalance
 from fxcrack.steps.evaluate import TipValues
 from fxcrack.steps.increments import TooManyCutbacks
 from fxcrack.steps.march import March
@@ -24,8 +24,6 @@ _NEAR_ONE = 1e-7
 """How near to 1 the iteration's own tolerance may leave f, where it no longer comes nearer."""
 _MANY = 30
 """Times f = 1 is looked for on the way back."""
-_FINE = 1.0 / 512.0
-"""Part of a way that is taken at once whatever the energies are."""
 _NO_WAY = 4e-16
 """Part of the time below which no way is made."""
 _SMALLEST = 1e-6
@@ -91,7 +89,7 @@ class NewtonMarch(March):
                     self.model.confirm(strict=strict)
             except OffBalance as error:
                 size = 0.5 * abs(guess - begin)
-                strict = size > _FINE * whole
+                strict = size > FINE * whole
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
             except ConvergenceError as error:
@@ -253,7 +251,7 @@ class NewtonMarch(March):
 
     def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
         self._renew()
-        return [(1.0, self._approach(target, _FINE * abs(target - self.time)))]
+        return [(1.0, self._approach(target, FINE * abs(target - self.time)))]
 
     def _approach(self, target: float, least: float) -> Equilibrium:
         """A trial at a time; where energies of the way do not add up, half of it is gone first.
