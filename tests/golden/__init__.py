@@ -1,0 +1,1 @@
+"""Golden histories: one small scene per capability, compared with stored histories."""
