@@ -79,8 +79,8 @@ def dcb3d(setting: Setting) -> Case:
     )
 
     def measure(history: fx.History) -> Measured:
-        growth = scene.growths[0]
-        values = growth.evaluate(growth.tips(), scene.model.state, scene.time)
+        growth = scene.cracks[0]
+        values = growth.evaluate(growth.tips(), scene.solver.state, scene.time)
         width = values.tips.width
         mean = float(values.report["GI"] @ width / width.sum())
         load = float(history.rows[-1]["R[pin_top.y]"])

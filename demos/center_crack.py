@@ -40,7 +40,7 @@ def make_scene(
     order: int = 1,
     remote: bool = True,
     watch: Sequence[Criterion] = (),
-    release: fx.Step | fx.AmplitudeRelease | None = None,
+    release: fx.StepRelease | fx.AmplitudeRelease | None = None,
 ) -> fx.Scene:
     """The plate under a remote tension of 1 at time 1, or a pressure of 1 on the crack's middle."""
     mesh = center_crack(
@@ -69,7 +69,7 @@ def make_scene(
             fx.Displacement("bottom_right", y=0.0),
         ],
         loads=loads,
-        debonds=[fx.Debond(bond, criterion, release or fx.Step(), watch)],
+        debonds=[fx.Debond(bond, criterion, release or fx.StepRelease(), watch)],
     )
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from mpi4py import MPI
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_2d
 

@@ -68,7 +68,7 @@ def grow(dx: float = 0.5, dy: float = 1.25, ny: int = 2, until: float = 34.0) ->
 
 def bow(scene: fx.Scene) -> float:
     """How far mid-width is ahead of the edges, length."""
-    surface, bonded = scene.pairs[0].surface, scene.model.fronts[0].bonded
+    surface, bonded = scene.pairs[0].surface, scene.solver.fronts[0].bonded
 
     def front_at(z: float) -> float:
         line = np.isclose(surface.x[:, 2], z, atol=1e-6)

@@ -54,7 +54,7 @@ def make_scene(
             fx.Displacement("pin_top", x=0.0, y=speed or 1.0),
             fx.Displacement("pin_bottom", x=0.0, y=-(speed or 1.0)),
         ],
-        debonds=[fx.Debond(bond, fx.VCCT(GIc=G_IC), release=fx.Progressive())],
+        debonds=[fx.Debond(bond, fx.VCCT(GIc=G_IC), release=fx.ProgressiveRelease())],
         effects=[fx.Inertia(rho_inf=0.5)] if speed else [],
     )
     return scene, bond
@@ -89,9 +89,9 @@ def passages(history: fx.History, lengths: Array) -> Array:
 def main(out: Path, fine: bool = False) -> None:
     """All speeds, the table, crack length and load against the way of the pins."""
     dx = 0.5 if fine else 1.0
-    at_rest = run(dx, None)
+    checkpoint_point = run(dx, None)
     lengths = np.arange(A0 + 1.0, UNTIL + 0.5)
-    way = passages(at_rest, lengths)
+    way = passages(checkpoint_point, lengths)
     moving = {name: run(dx, speed) for name, speed in SPEEDS.items()}
     rows, curves = [], []
     for name, history in moving.items():
@@ -125,18 +125,18 @@ def main(out: Path, fine: bool = False) -> None:
     )
     for name, _, history in curves:
         history.to_csv(out / f"{name.split()[0].replace('.', '_')}_m_s.csv")
-    at_rest.plot(
+    checkpoint_point.plot(
         out / "crack_length.png",
-        x=2.0 * at_rest["time"].astype(float),
+        x=2.0 * checkpoint_point["time"].astype(float),
         y="a[bond]",
         xlabel="opening of the pins / mm",
         ylabel="crack length a / mm",
         label="quasi-static",
         reference=[(name, x, h["a[bond]"].astype(float)) for name, x, h in curves],
     )
-    at_rest.plot(
+    checkpoint_point.plot(
         out / "load.png",
-        x=2.0 * at_rest["time"].astype(float),
+        x=2.0 * checkpoint_point["time"].astype(float),
         y="R[pin_top.y]",
         xlabel="opening of the pins / mm",
         ylabel="load P / N",

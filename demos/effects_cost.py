@@ -18,7 +18,7 @@ import fxcrack as fx
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.output.explain import explain
-from fxcrack.output.figure import COLOURS, dress, new_figure, save
+from fxcrack.output.plots.style import COLOURS, dress, new_figure, save
 
 ELASTIC = fx.Isotropic(70e3, 0.3, expansion=1e-5)
 

@@ -32,11 +32,11 @@ from mpi4py import MPI
 from scipy.interpolate import CubicSpline
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.demos.dcb import ARMS, BEAM, G_IC
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.output.figure import COLOURS, dress, legend, new_figure, save
+from fxcrack.output.plots.style import COLOURS, dress, legend, new_figure, save
 
 Array = npt.NDArray[np.float64]
 

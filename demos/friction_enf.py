@@ -23,7 +23,7 @@ import fxcrack as fx
 from fxcrack.demos.enf import ARMS, BEAM, G_IIC
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.enf import enf_2d
-from fxcrack.output import figure
+from fxcrack.output.plots import style as figure
 
 A0, HEIGHT = 35.0, 2.25
 COEFFICIENTS = (0.0, 0.2, 0.4, 0.6)

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_3d
 
@@ -36,7 +36,12 @@ STRAIN_BEAM = CorrectedBeam(E=70e3 / (1.0 - 0.3**2), E22=70e3, G=70e3 / 2.6, h=1
 
 
 def make_scene(
-    a: float, release: fx.Step | fx.Progressive, dx: float, dy: float, ny: int, order: int = 1
+    a: float,
+    release: fx.StepRelease | fx.ProgressiveRelease,
+    dx: float,
+    dy: float,
+    ny: int,
+    order: int = 1,
 ) -> tuple[fx.Scene, fx.Interface]:
     """The bench specimen with a straight front at a."""
     mesh = dcb_3d(length=100.0, height=1.5, width=20.0, dx=dx, dy=dy, ny=ny, order=order)
@@ -64,7 +69,7 @@ def straight_front(
     """Opening and load of a straight front at G_c, from the compliance of the mesh."""
     a, compliance = np.array(lengths), []
     for length in lengths:
-        scene, _ = make_scene(length, fx.Step(), dx, dy, ny, order)
+        scene, _ = make_scene(length, fx.StepRelease(), dx, dy, ny, order)
         history = scene.run(fx.Static(until=fx.Time(1.0)), grow=[], progress=False)
         compliance.append(1.0 / history["R[end_upper.y]"][-1])
         scene.close()
@@ -76,7 +81,7 @@ def straight_front(
 
 
 def run(
-    release: fx.Step | fx.Progressive,
+    release: fx.StepRelease | fx.ProgressiveRelease,
     dx: float = 1.0,
     dy: float = 2.0,
     ny: int = 2,
@@ -100,7 +105,7 @@ def run(
         for beam in (BEAM, STRAIN_BEAM)
     )
     area, spent = history["area[bond]"][inside], history["released_energy"][inside]
-    soft, onsets = scene.model.soft_counts, int((history["event"] == "onset").sum())
+    soft, onsets = scene.solver.soft_counts, int((history["event"] == "onset").sum())
     return scene, {
         "load / theory": stress,
         "load / plane strain": strain,
@@ -126,7 +131,7 @@ def main(out: Path, fine: bool = False) -> None:
     loads, effort, curves = [], [], []
     straight = straight_front(*mesh)
     of_mesh = straight[1] / BEAM.dcb_load_at_opening(straight[0], G_IC)
-    for name, release in (("step", fx.Step()), ("progressive", fx.Progressive())):
+    for name, release in (("step", fx.StepRelease()), ("progressive", fx.ProgressiveRelease())):
         scene, found = run(release, *mesh)
         stress, strain, lowest, highest, dissipated, balance, onsets, steps, s = found.values()
         loads.append([name, stress, strain, stress / of_mesh.mean(), lowest, highest])

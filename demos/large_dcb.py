@@ -34,7 +34,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.beam import two_arms
 from fxcrack.meshes.blocks import Blocks, build

@@ -12,7 +12,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.mmb import mmb_2d
 

@@ -20,7 +20,7 @@ import numpy.typing as npt
 import fxcrack as fx
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.center_crack import center_crack
-from fxcrack.output import figure
+from fxcrack.output.plots import style as figure
 
 MU = 0.4
 STEEL = fx.Isotropic(E=210e3, nu=0.3)
@@ -81,7 +81,7 @@ def run(
     way: list[list[float]] = []
 
     def look(event: str, row: dict[str, Any]) -> None:
-        friction, model = scene.model.system.friction, scene.model
+        friction, model = scene.solver.system.friction, scene.solver
         assert friction is not None
         x = scene.pairs[0].surface.x[friction.where[:, 1], 0]
         opening, slip = friction.of(model.state.jump)[np.argmin(np.abs(x))]

@@ -36,7 +36,7 @@ from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
 from fxcrack.meshes.spacing import fine_region
-from fxcrack.output.figure import COLOURS, dress, legend, new_figure, save
+from fxcrack.output.plots.style import COLOURS, dress, legend, new_figure, save
 
 Array = npt.NDArray[np.float64]
 

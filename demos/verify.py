@@ -43,7 +43,7 @@ def lines(fine: bool = False) -> list[Line]:
     scene, found = enhanced_dcb.run(0.15)
     scene.close()
     out.append(("enhanced VCCT, dissipated", "toughness given", found["dissipated"], 0.15))
-    scene, found = front3d.run(fx.Progressive())
+    scene, found = front3d.run(fx.ProgressiveRelease())
     scene.close()
     out.append(("progressive 3-D, dissipated", "toughness given", found["dissipated"], 0.20))
     return out

@@ -1,7 +1,28 @@
 """fxcrack: crack propagation along predefined, initially bonded interfaces, on FEniCSx."""
 
-from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
-from fxcrack.abort import install as _install_abort
+import importlib
+import warnings
+from typing import TYPE_CHECKING
+
+from fxcrack.base import compat  # noqa: F401  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.base.parallel import install as _install_abort
+from fxcrack.base.signals import Interrupted
+from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.loads import (
+    Amplitude,
+    BodyForce,
+    Displacement,
+    Monitor,
+    PointForce,
+    Pressure,
+    Ramp,
+    Traction,
+)
+from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
+from fxcrack.continuum.temperature import ByTemperature, Temperature
 from fxcrack.criteria import (
     BK,
     VCCT,
@@ -13,46 +34,62 @@ from fxcrack.criteria import (
     Fatigue,
     Paris,
     Power,
-    Progressive,
+    ProgressiveRelease,
+    RampRelease,
     Reeder,
-    Step,
+    StepRelease,
     Tabulated,
 )
-from fxcrack.criteria import Ramp as OpeningRamp
 from fxcrack.effects import FiniteStrain
-from fxcrack.errors import FxcrackError, InputError
-from fxcrack.inertia import Inertia
+from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
-from fxcrack.interrupt import Interrupted
-from fxcrack.loads import (
-    Amplitude,
-    BodyForce,
-    Displacement,
-    Monitor,
-    PointForce,
-    Pressure,
-    Ramp,
-    Traction,
-)
-from fxcrack.materials import Isotropic, Orthotropic
 from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
-from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress, Solid
-from fxcrack.nonlinear_materials import NeoHookean, Plastic
-from fxcrack.output import plots
-from fxcrack.output.bonds import BondHistory, bond_table, write_releases
-from fxcrack.output.checkpoint import Checkpoint, checkpoints
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
-from fxcrack.output.history import History
-from fxcrack.output.report import tip_table, write_tip_table
+from fxcrack.output.tables import (
+    BondHistory,
+    bond_table,
+    tip_table,
+    write_releases,
+    write_tip_table,
+)
+from fxcrack.restart.checkpoint import Checkpoint, checkpoints
 from fxcrack.scene import Debond, Scene
-from fxcrack.solve.newton import NewtonOptions
-from fxcrack.solve.options import CondensedOptions
-from fxcrack.steps.fatigue import Cycles
+from fxcrack.solvers.options import NewtonOptions
+from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.end_conditions import CrackLength, Releases, Time
 from fxcrack.steps.static import Dynamic, Static
-from fxcrack.steps.until import CrackLength, Releases, Time
-from fxcrack.temperature import ByTemperature, Temperature
+
+if TYPE_CHECKING:
+    from fxcrack.output import plots as plots
 
 __version__ = "0.1.0"
+
+_FORMER_NAMES = {
+    "OpeningRamp": "RampRelease",
+    "Progressive": "ProgressiveRelease",
+    "Step": "StepRelease",
+}
+"""Deprecated public names; they go with the next release."""
+
+
+def __getattr__(name: str) -> object:
+    """``plots``, which loads matplotlib, or a former spelling of a name, with a warning.
+
+    Raises:
+        AttributeError: There is no such name.
+    """
+    if name == "plots":
+        return importlib.import_module("fxcrack.output.plots")
+    if name in _FORMER_NAMES:
+        new = _FORMER_NAMES[name]
+        warnings.warn(
+            f"fxcrack.{name} is now called fxcrack.{new}; the former name will be removed",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return globals()[new]
+    raise AttributeError(f"module 'fxcrack' has no attribute '{name}'")
+
 
 _install_abort()
 
@@ -90,7 +127,6 @@ __all__ = [
     "Monitor",
     "NeoHookean",
     "NewtonOptions",
-    "OpeningRamp",
     "Orthotropic",
     "Paris",
     "PlaneStrain",
@@ -99,25 +135,24 @@ __all__ = [
     "PointForce",
     "Power",
     "Pressure",
-    "Progressive",
+    "ProgressiveRelease",
     "Ramp",
+    "RampRelease",
     "Reeder",
     "Releases",
     "Scene",
     "Solid",
     "Split",
     "Static",
-    "Step",
+    "StepRelease",
     "Tabulated",
     "Temperature",
     "Time",
     "Traction",
     "bond_table",
     "checkpoints",
-    "compat",
     "displacement_function",
     "mesh_from_gmsh",
-    "plots",
     "read_mesh",
     "tip_table",
     "write_fields",

@@ -31,14 +31,14 @@ from rich.console import Console
 from rich.table import Table
 from typer.main import get_command
 
-from fxcrack import log
-from fxcrack.abort import all_arrive, end_all
+from fxcrack.base import log
+from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.base.files import replacing
+from fxcrack.base.parallel import all_arrive, end_all
+from fxcrack.base.signals import Interrupted
 from fxcrack.bench.problem import NAMES, Problem
-from fxcrack.errors import FxcrackError, InputError
-from fxcrack.interrupt import Interrupted
-from fxcrack.output.atomic import replacing
-from fxcrack.output.checkpoint import checkpoints
-from fxcrack.solve.petsc_schur import library
+from fxcrack.condensation.mumps_schur import library
+from fxcrack.restart.checkpoint import checkpoints
 
 _FILE_WIDTH = 140  # characters of a table that goes into a file or a pipe
 _PATIENCE = 5.0  # seconds a rank that failed waits for the others to fail with it
@@ -172,8 +172,8 @@ def _scale(
     json_file: Path | None,
     store: Path | None,
 ) -> None:
+    from fxcrack.base.machine import machine_memory_mb
     from fxcrack.bench import fit, scale, scale_report
-    from fxcrack.solve.machine import machine_memory_mb
 
     comm = MPI.COMM_WORLD
     if comm.size > 1:
@@ -217,9 +217,9 @@ def cost(
     ] = None,
 ) -> None:
     """Say what an analysis will cost, on how many ranks, and by which solver."""
+    from fxcrack.base.machine import machine_memory_mb
+    from fxcrack.bench.cost import Constants, Task, advise, shipped
     from fxcrack.bench.scale_report import show_cost
-    from fxcrack.solve.cost import Constants, Task, advise, shipped
-    from fxcrack.solve.machine import machine_memory_mb
 
     measured = shipped() if constants is None else Constants.read(constants)
     each = 1e9 * memory if memory else 1e6 * machine_memory_mb(MPI.COMM_WORLD) / _cores()

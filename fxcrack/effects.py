@@ -11,15 +11,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fxcrack import log
-from fxcrack.continuum import Continuum
-from fxcrack.errors import InputError
+from fxcrack.base import log
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import Load, Pressure
+from fxcrack.continuum.temperature import expansion_of
 from fxcrack.interface.pairing import Interface
-from fxcrack.loads import Load, Pressure
-from fxcrack.temperature import expansion_of
 
 if TYPE_CHECKING:
-    from fxcrack.terms import Term
+    from fxcrack.continuum.term import Term
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,7 @@ def plan(
         on.append(f"follower pressure '{title}'")
         why.append(f"pressure '{title}' follows the bodies")
     if continuum.temperature is not None:
-        from fxcrack import thermal
+        from fxcrack.continuum import thermal_strain as thermal
 
         if not any(
             hasattr(m, "temperatures") or expansion_of(m).any() for m in continuum.part_materials
@@ -152,25 +152,25 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     names = {type(e).__name__: e for e in effects}
     terms: list[Term] = []
     if "elastic" in forms:
-        from fxcrack.terms.elastic import Elastic
+        from fxcrack.continuum.elastic import Elastic
 
         finite = "FiniteStrain" in names or "neo_hookean" in forms
         terms.append(Elastic(continuum, finite=finite))
     if "neo_hookean" in forms:
-        from fxcrack.terms.neo_hookean import NeoHookeanBodies
+        from fxcrack.continuum.neo_hookean import NeoHookeanBodies
 
         terms.append(NeoHookeanBodies(continuum))
     if "plastic" in forms:
-        from fxcrack.terms.plastic import Plasticity
+        from fxcrack.continuum.plasticity import Plasticity
 
         terms.append(Plasticity(continuum))
     for load in loads:
         if isinstance(load, Pressure) and getattr(load, "follows", False):
-            from fxcrack.terms.pressure import FollowerPressure
+            from fxcrack.continuum.follower_pressure import FollowerPressure
 
             terms.append(FollowerPressure(continuum, load))
     if "Inertia" in names:
-        from fxcrack.terms.inertia import InertiaForces
+        from fxcrack.continuum.inertia import InertiaForces
 
         terms.append(InertiaForces(continuum, names["Inertia"]))
     return terms
@@ -183,7 +183,7 @@ def dead_loads(continuum: Continuum, loads: Sequence[Load], path: str) -> list[A
     """
     out: list[Any] = [x for x in loads if not getattr(x, "follows", False)]
     if continuum.temperature is not None and path == "condensed":
-        from fxcrack.thermal import thermal_loads
+        from fxcrack.continuum.thermal_strain import thermal_loads
 
         out += thermal_loads(continuum)
     return out

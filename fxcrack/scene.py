@@ -7,19 +7,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from fxcrack import log
-from fxcrack.accuracy.estimate import as_details, check_accuracy, demand
-from fxcrack.arguments import check_amplitudes, one, several, warn_of_same_titles
-from fxcrack.continuum import Continuum
-from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
-from fxcrack.errors import InputError
-from fxcrack.inertia import Inertia
-from fxcrack.interface.front import why_no_tip
-from fxcrack.interface.pairing import Interface, make_pair
-from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
-from fxcrack.loads import (
+from fxcrack.base import log
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import check_amplitudes, check_instance, check_list, warn_of_same_titles
+from fxcrack.base.errors import InputError
+from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.loads import (
     BodyForce,
     Displacement,
     Load,
@@ -28,26 +25,29 @@ from fxcrack.loads import (
     Pressure,
     Traction,
 )
-from fxcrack.materials import Material
+from fxcrack.continuum.materials import Material
+from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
+from fxcrack.error_estimate import as_details, check_accuracy, demand
+from fxcrack.history import History, Row
+from fxcrack.interface.front import why_no_tip
+from fxcrack.interface.pairing import Interface, make_pair
+from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
 from fxcrack.mesh import Mesh
-from fxcrack.models import Axisymmetric, Model, PlaneStrain, PlaneStress, Solid
-from fxcrack.output.checkpoint import Checkpoint
 from fxcrack.output.explain import Explanation, explain
-from fxcrack.output.history import History, Row
-from fxcrack.output.progress import Progress
-from fxcrack.solve.condensed import CondensedModel
-from fxcrack.solve.newton import NewtonOptions
-from fxcrack.solve.options import CondensedOptions
-from fxcrack.steps.cycle_march import CycleMarch
-from fxcrack.steps.fatigue import Cycles, FatigueState, check_criteria
-from fxcrack.steps.growth import Debond, Growth, check_friction
-from fxcrack.steps.keeper import Keeper, keeper_of
-from fxcrack.steps.letting_go import Letting, given_forces
-from fxcrack.steps.march import March, Observer
+from fxcrack.restart.checkpoint import Checkpoint
+from fxcrack.restart.manager import RestartManager, restart_manager
+from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.options import NewtonOptions
+from fxcrack.steps.crack import Crack
+from fxcrack.steps.cycle_state import FatigueState
+from fxcrack.steps.cycles import Cycles, check_criteria
+from fxcrack.steps.cyclic import CyclicDriver
+from fxcrack.steps.debond import Debond, check_friction
+from fxcrack.steps.end_conditions import CrackLength
+from fxcrack.steps.force_ramps import ForceRamp, given_forces
+from fxcrack.steps.progress import Progress
+from fxcrack.steps.quasi_static import Observer, QuasiStaticDriver
 from fxcrack.steps.static import Dynamic, Static
-from fxcrack.steps.until import CrackLength
-
-Array = npt.NDArray[np.float64]
 
 
 class Scene:
@@ -92,20 +92,26 @@ class Scene:
         newton: NewtonOptions | None = None,
     ) -> None:
         self.parts = {k: v for k, v in locals().items() if k not in ("self", "mesh")}
-        one("Scene", "mesh", mesh, Mesh, "read_mesh('mine.msh')")
-        one("Scene", "model", model, (PlaneStrain, PlaneStress, Axisymmetric, Solid), "Solid()")
-        supports = several("Scene", "supports", supports, Displacement)
-        loads = several("Scene", "loads", loads, (Traction, Pressure, BodyForce, PointForce))
+        check_instance("Scene", "mesh", mesh, Mesh, "read_mesh('mine.msh')")
+        check_instance(
+            "Scene", "model", model, (PlaneStrain, PlaneStress, Axisymmetric, Solid), "Solid()"
+        )
+        supports = check_list("Scene", "supports", supports, Displacement)
+        loads = check_list("Scene", "loads", loads, (Traction, Pressure, BodyForce, PointForce))
         check_amplitudes([*supports, *loads])
         warn_of_same_titles("loads", loads)
-        debonds = several("Scene", "debonds", debonds, Debond)
-        bonds = several("Scene", "bonds", bonds, Interface)
-        monitors = several("Scene", "monitors", monitors, Monitor)
+        debonds = check_list("Scene", "debonds", debonds, Debond)
+        bonds = check_list("Scene", "bonds", bonds, Interface)
+        monitors = check_list("Scene", "monitors", monitors, Monitor)
         warn_of_same_titles("monitors", monitors)
         if newton is not None:
-            one("Scene", "newton", newton, NewtonOptions, "NewtonOptions(max_iterations=40)")
+            check_instance(
+                "Scene", "newton", newton, NewtonOptions, "NewtonOptions(max_iterations=40)"
+            )
         if options is not None:
-            one("Scene", "options", options, CondensedOptions, "CondensedOptions(rows=2.0)")
+            check_instance(
+                "Scene", "options", options, CondensedOptions, "CondensedOptions(rows=2.0)"
+            )
         if not isinstance(effects, Sequence):
             raise InputError(
                 f"Scene: effects must be a list, not {type(effects).__name__}; write effects=[...]"
@@ -130,27 +136,27 @@ class Scene:
         self.plan = plan(self.continuum, self.effects, loads, interfaces, path)
         self.loads = dead_loads(self.continuum, loads, self.plan.path)
         parts = self.continuum, self.pairs, self.supports, self.loads, monitors
-        self.model: CondensedModel
+        self.solver: LinearSolver
         if self.plan.path == "condensed":
-            self.model = CondensedModel(*parts, options or CondensedOptions())
+            self.solver = LinearSolver(*parts, options or CondensedOptions())
         else:
-            from fxcrack.solve.newton_model import NewtonModel  # only scenes that need it pay
-            from fxcrack.terms.bodies import Bodies
+            from fxcrack.continuum.weak_form import WeakForm
+            from fxcrack.solvers.newton import NewtonSolver  # only scenes that need it pay
 
             terms = form_terms(self.continuum, self.effects, loads)
-            self.model = NewtonModel(
+            self.solver = NewtonSolver(
                 *parts,
                 options or CondensedOptions(rows=0.0),
-                bodies=Bodies(self.continuum, terms),
+                bodies=WeakForm(self.continuum, terms),
                 newton=newton or NewtonOptions(),
             )
-        self.growths: list[Growth] = []
+        self.cracks: list[Crack] = []
         self.time = 0.0
         self._work = 0.0
         self._released = 0.0
         self._snapped = 0.0
         self._viscous = 0.0
-        self.ramps: list[Letting] = []
+        self.ramps: list[ForceRamp] = []
         self._increment = 0
         self.fatigue = FatigueState()
         self.history = History(mesh.comm)
@@ -193,7 +199,7 @@ class Scene:
                 history, e.g. :class:`fxcrack.output.fields.FieldSeries`.
             accuracy: Relative error that load and G may have for the mesh's and the increments'
                 sake. After the run it is estimated from a second solution to the first onset (see
-                :mod:`fxcrack.accuracy.estimate`), which is kept in ``history.details``.
+                :mod:`fxcrack.error_estimate`), which is kept in ``history.details``.
             save: File (.csv or .json) that holds the history while the step runs.
             checkpoint: Where and how often the state is saved.
             restart: Go on from the checkpoint if there is one; with the same scene and step, on
@@ -208,8 +214,8 @@ class Scene:
         """
         if accuracy is not None:
             check_accuracy(accuracy)
-        one("run", "step", step, (Static, Cycles), "Static(until=Time(1.0))")
-        chosen = self.debonds if grow is None else several("run", "grow", grow, Debond)
+        check_instance("run", "step", step, (Static, Cycles), "Static(until=Time(1.0))")
+        chosen = self.debonds if grow is None else check_list("run", "grow", grow, Debond)
         for debond in chosen:
             if debond not in self.debonds:
                 raise InputError(
@@ -224,36 +230,36 @@ class Scene:
         active = [d in chosen for d in self.debonds]
         active += [False] * (len(self.pairs) - len(self.debonds))
         if not self._started:
-            self.growths = [Growth(self.model, p, d) for p, d in enumerate(self.debonds)]
-        growths = [g for g, on in zip(self.growths, active, strict=False) if on]
-        for g in growths:
+            self.cracks = [Crack(self.solver, p, d) for p, d in enumerate(self.debonds)]
+        cracks = [g for g, on in zip(self.cracks, active, strict=False) if on]
+        for g in cracks:
             if not len(g.tips()):
                 log.warn("%s, so nothing can debond", why_no_tip(g.front))
-        keeper = keeper_of(self, step, active, checkpoint, restart, save)
-        self.model.prepare(active, self._reach(step))
+        keeper = restart_manager(self, step, active, checkpoint, restart, save)
+        self.solver.prepare(active, self._reach(step))
         if keeper.resume is not None:
             keeper.put_in_equilibrium()
             self._take_books(keeper.resume)
             self._started = True
         elif not self._started:
-            for pair, held in zip(self.pairs, self.model.held_by_supports, strict=True):
+            for pair, held in zip(self.pairs, self.solver.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
-            self.model.start()
+            self.solver.start()
             self._started = True
         else:
             # another window: the same equilibrium in its components
-            self.model.solve(given_forces(self.model, self.ramps, self.time, self._increment))
+            self.solver.solve(given_forces(self.solver, self.ramps, self.time, self._increment))
         self.history.reason = keeper.finished or self._go(
-            growths, step, keeper, progress=progress, observers=observers
+            cracks, step, keeper, progress=progress, observers=observers
         )
         self.history.details = {
             "dofs": self.continuum.n_global,
-            "window": self.model.system.n_window,
-            "releases": sum(g.n_released for g in self.growths),
-            "factorizations": self.model.timings.factorizations,
+            "window": self.solver.system.n_retained,
+            "releases": sum(g.n_released for g in self.cracks),
+            "factorizations": self.solver.timings.factorizations,
             "ranks": self.mesh.comm.size,
-            "contact_steps": self.model.system.contact_steps,
-            "seconds": dict(self.model.timings.seconds),
+            "contact_steps": self.solver.system.contact_steps,
+            "seconds": dict(self.solver.timings.seconds),
         }
         if self.fatigue.table["N"]:
             self.history.details["tips"] = self.fatigue.table
@@ -263,9 +269,9 @@ class Scene:
 
     def _go(
         self,
-        growths: list[Growth],
+        cracks: list[Crack],
         step: Static | Cycles,
-        keeper: Keeper,
+        keeper: RestartManager,
         *,
         progress: bool,
         observers: Sequence[Observer],
@@ -279,7 +285,7 @@ class Scene:
                     observe(event, row)
 
             march = self._march(
-                growths,
+                cracks,
                 step,
                 time=self.time,
                 work=self._work,
@@ -289,7 +295,7 @@ class Scene:
                 ramps=self.ramps,
                 increment=self._increment,
                 observer=tell,
-                at_rest=keeper.at_rest if keeper.wanted else None,
+                checkpoint_point=keeper.checkpoint_point if keeper.wanted else None,
                 resume=keeper.resume,
             )
             try:
@@ -306,28 +312,30 @@ class Scene:
         self._snapped, self._viscous = books["snapped"], books["viscous"]
         self._increment = books["increment"]
 
-    def _march(self, growths: list[Growth], step: Static | Cycles, **carried: Any) -> March:
+    def _march(
+        self, cracks: list[Crack], step: Static | Cycles, **carried: Any
+    ) -> QuasiStaticDriver:
         common = self.history, self.loads_at, self._breaks()
         if self.plan.path == "newton":
-            from fxcrack.steps.newton_march import NewtonMarch
+            from fxcrack.steps.newton_path import NewtonLoadPath
 
             if isinstance(step, Cycles):
                 raise InputError(
                     "fatigue steps need linear bodies, but this scene takes the nonlinear path "
                     f"({'; '.join(self.plan.why)}); leave that effect out, or run Static steps"
                 )
-            return NewtonMarch(self.model, growths, step, *common, **carried)
+            return NewtonLoadPath(self.solver, cracks, step, *common, **carried)
         if isinstance(step, Cycles):
             carried["fatigue"] = self.fatigue
-            return CycleMarch(self.model, growths, step, *common, **carried)
-        return March(self.model, growths, step, *common, **carried)
+            return CyclicDriver(self.solver, cracks, step, *common, **carried)
+        return QuasiStaticDriver(self.solver, cracks, step, *common, **carried)
 
     def _reach(self, step: Static | Cycles) -> list[float]:
         """How far each crack may grow in a step, length."""
         out = [np.inf] * len(self.pairs)
         for end in step.ends:
             if isinstance(end, CrackLength):
-                for g in self.growths:
+                for g in self.cracks:
                     if self.pairs[g.p].interface is end.interface:
                         ahead = end.length - g.extent.length(g.tips())
                         size = self.pairs[g.p].surface.facet_size
@@ -352,7 +360,7 @@ class Scene:
         On one rank this happens by itself when the scene is no longer used. On several it does not:
         close scenes made in a loop, for MPI has a limited number of communicators.
         """
-        self.model.destroy()
+        self.solver.destroy()
 
 
 __all__ = ["Debond", "Scene"]

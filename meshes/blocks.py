@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Mesh
 from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.raw import RawMesh, distinct, on_root

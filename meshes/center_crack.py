@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from mpi4py import MPI
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies

@@ -11,7 +11,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fxcrack.errors import FxcrackError
+from fxcrack.base.errors import FxcrackError
 from fxcrack.mesh import Mesh
 
 _KINDS: dict[str, dict[str, Any]] = {

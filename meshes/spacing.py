@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 
 Floats = npt.NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from fxcrack import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
 import dolfinx.fem
 import dolfinx.mesh
 import numpy as np
@@ -13,9 +13,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack as fx
-from fxcrack.continuum import Continuum
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.mesh import Group, Mesh
-from fxcrack.terms.bodies import Bodies
 
 Array = npt.NDArray[np.float64]
 
@@ -88,14 +88,14 @@ def wavy(continuum: Continuum, size: float, seed: int) -> dolfinx.fem.Function:
     return out
 
 
-def place(bodies: Bodies, values: Array) -> None:
+def place(bodies: WeakForm, values: Array) -> None:
     """Set the trial displacement from the owned dofs of this rank."""
     vector = PETSc.Vec().createWithArray(values.copy(), comm=bodies.continuum.comm)
     bodies.set(vector)
     vector.destroy()
 
 
-def internal(bodies: Bodies, values: Array) -> Array:
+def internal(bodies: WeakForm, values: Array) -> Array:
     """Residual at a displacement, owned dofs."""
     place(bodies, values)
     r = bodies.residual()
@@ -104,13 +104,13 @@ def internal(bodies: Bodies, values: Array) -> Array:
     return out
 
 
-def total(bodies: Bodies, values: Array) -> float:
+def total(bodies: WeakForm, values: Array) -> float:
     """Sum of all stored energies at a displacement."""
     place(bodies, values)
     return sum(bodies.stored().values())
 
 
-def times(bodies: Bodies, direction: Array) -> Array:
+def times(bodies: WeakForm, direction: Array) -> Array:
     """Product of the present tangent with a direction, owned dofs."""
     matrix = bodies.tangent()
     x, y = matrix.createVecs()
@@ -133,7 +133,7 @@ def dot(continuum: Continuum, x: Array, y: Array) -> float:
 
 
 def taylor_rates(
-    bodies: Bodies, at: Array, along: Array, steps: Sequence[float], *, energy: bool = True
+    bodies: WeakForm, at: Array, along: Array, steps: Sequence[float], *, energy: bool = True
 ) -> tuple[Array, Array]:
     """Rates of the second-order remainders of energy and residual as steps shrink.
 
@@ -166,7 +166,7 @@ def held_dofs(continuum: Continuum, held: Sequence[tuple[str, int]]) -> npt.NDAr
 
 
 def solve(
-    bodies: Bodies,
+    bodies: WeakForm,
     held: Sequence[tuple[str, int]],
     *,
     values: Callable[[Array], Array] | None = None,

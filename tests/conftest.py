@@ -26,7 +26,7 @@ import pytest
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fxcrack.abort import end_all
+from fxcrack.base.parallel import end_all
 
 # Same examples on every rank and in every run; compilation of forms makes first examples slow.
 hypothesis.settings.register_profile("fxcrack", derandomize=True, deadline=None, database=None)

@@ -12,9 +12,9 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack as fx
+from fxcrack.history import Row
 from fxcrack.interface.surface import FacetSurface, facet_element
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
-from fxcrack.output.history import Row
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -73,7 +73,7 @@ def specimen(
     debond = fx.Debond(
         interface or bond(a0, contact=contact),
         criterion or fx.VCCT(GIc=0.2),
-        release or fx.Step(),
+        release or fx.StepRelease(),
         temperature=temperature,
     )
     return fx.Scene(

@@ -15,12 +15,12 @@ import pytest
 import fxcrack as fx
 from fxcrack import cli
 from fxcrack.accuracy import AccuracyError, Setting, choose
-from fxcrack.accuracy.estimate import estimate_errors
 from fxcrack.accuracy.launch import SettingFailed, TookTooLong, Workers
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.run import run
 from fxcrack.accuracy.scenes import STUDIES
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
+from fxcrack.error_estimate import estimate_errors
 
 OWN = """
 from fxcrack.accuracy import Case, Measured, Setting, study

@@ -18,7 +18,7 @@ from fxcrack.accuracy.labels import overlap, place
 from fxcrack.accuracy.pareto import advice, cheapest, duration, pareto_front, percent
 from fxcrack.accuracy.reference import own_reference, reference, worst
 from fxcrack.accuracy.scenes import STUDIES
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
 
 positive = st.floats(1e-3, 1e3)
 points = st.lists(st.tuples(positive, positive), min_size=1, max_size=30)

@@ -66,7 +66,7 @@ def test_parts_of_the_wrong_kind(mesh: fx.Mesh, parts: dict[str, Any], words: st
         lambda: fx.PlaneStrain(thickness="25"),  # type: ignore[arg-type]
         lambda: fx.Inertia(density=1.0, velocity=1.0),  # type: ignore[arg-type]
         lambda: fx.Debond(BOND, fx.VCCT(GIc=0.2), "step"),  # type: ignore[arg-type]
-        lambda: fx.Debond(BOND, fx.VCCT(GIc=0.2), fx.Step),  # type: ignore[arg-type]
+        lambda: fx.Debond(BOND, fx.VCCT(GIc=0.2), fx.StepRelease),  # type: ignore[arg-type]
     ],
 )
 def test_values_of_the_wrong_kind(make: Callable[[], Any]) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 
 T300 = CorrectedBeam(E=139.4e3, E22=10.16e3, G=4.6e3, h=1.5, b=25.0)
 IM7 = CorrectedBeam(E=161.0e3, E22=11.38e3, G=5.2e3, h=2.25, b=25.4)

@@ -12,10 +12,10 @@ import pytest
 from mpi4py import MPI
 from rich.console import Console
 
+from fxcrack.base.errors import InputError, SolverError
 from fxcrack.bench import measure, report
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.bench.run import run
-from fxcrack.errors import InputError, SolverError
 
 COMM = MPI.COMM_WORLD
 KEYS = {

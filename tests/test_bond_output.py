@@ -13,7 +13,7 @@ from specimens import bond, dcb, specimen
 from test_criteria_in_analysis import plate, run
 
 import fxcrack as fx
-from fxcrack.criteria import Ramp
+from fxcrack.criteria import RampRelease
 from fxcrack.meshes.dcb import dcb_3d
 from fxcrack.meshes.penny import penny
 from fxcrack.output.fields import displacement_function
@@ -40,7 +40,7 @@ def along_an_amplitude() -> fx.Scene:
 
 def softening() -> fx.Scene:
     """A bond that falls with its opening, half-way."""
-    scene = dcb(MPI.COMM_WORLD, dx=1.0, ny=2, release=fx.Progressive())
+    scene = dcb(MPI.COMM_WORLD, dx=1.0, ny=2, release=fx.ProgressiveRelease())
     scene.run(fx.Static(until=fx.Releases(2)))
     scene.run(fx.Static(until=fx.Time(1.005 * scene.time)))
     return scene
@@ -49,7 +49,7 @@ def softening() -> fx.Scene:
 def over_increments() -> fx.Scene:
     """A front under a ramp of eight increments, not yet over."""
     mesh = dcb_3d(length=30.0, width=4.0, dx=1.0, dy=2.0, ny=1)
-    scene = specimen(mesh, a0=10.0, release=Ramp(increments=8))
+    scene = specimen(mesh, a0=10.0, release=RampRelease(increments=8))
     scene.run(fx.Static(until=fx.Releases(2), **INCREMENTS))
     scene.run(fx.Static(until=fx.Time(scene.time + 0.025), **INCREMENTS))
     return scene
@@ -67,7 +67,7 @@ SCENES: dict[str, Callable[[], fx.Scene]] = {
 def test_remaining_stress_is_what_the_failed_bond_carries(name: str) -> None:
     scene = SCENES[name]()
     found = fields(scene)
-    bonds, (growth,) = found.bonds, scene.growths
+    bonds, (growth,) = found.bonds, scene.cracks
     assert set(bonds) == NAMES
     gone = np.array([r.node for r in growth.records])
     half_way = gone[(bonds["DBSF"][gone] > 0.01) & (bonds["DBSF"][gone] < 0.99)]
@@ -95,7 +95,7 @@ def test_remaining_stress_is_what_the_failed_bond_carries(name: str) -> None:
 def test_what_is_known_at_failure_stays_and_the_front_shows_the_present() -> None:
     scene = dcb(MPI.COMM_WORLD, dx=1.0, ny=2)
     history = scene.run(fx.Static(until=fx.Releases(3)))
-    found, (growth,) = fields(scene), scene.growths
+    found, (growth,) = fields(scene), scene.cracks
     for record in growth.records:
         assert found.bonds["DBT"][record.node] == record.DBT
         assert found.bonds["EFENRRTR"][record.node] == record.EFENRRTR
@@ -128,10 +128,10 @@ def test_bond_stress_is_that_of_the_bond_under_pressure_on_the_faces() -> None:
         debonds=[fx.Debond(bond(2.0), fx.VCCT(GIc=1e-4))],
     )
     scene.run(fx.Static(until=fx.Time(1e-3)))
-    (tip,) = scene.growths[0].tips().node
+    (tip,) = scene.cracks[0].tips().node
     before = fields(scene).traction[tip] / scene.time
     scene.run(fx.Static(until=fx.Releases(1)))
-    (record,) = scene.growths[0].records
+    (record,) = scene.cracks[0].records
     assert record.node == tip
     # linear up to the first release
     expected = before @ record.frame * record.DBT
@@ -141,7 +141,7 @@ def test_bond_stress_is_that_of_the_bond_under_pressure_on_the_faces() -> None:
 
 @pytest.mark.mpi
 def test_history_of_chosen_bonds(shared_path: Path, comm: MPI.Intracomm) -> None:
-    scene = dcb(comm, dx=1.0, ny=2, release=Ramp(increments=4))
+    scene = dcb(comm, dx=1.0, ny=2, release=RampRelease(increments=4))
     seen = fx.BondHistory(scene, "bond", lambda x: np.abs(x[0] - 31.0) < 0.1)
     every = fx.BondHistory(scene, "bond")
     end = fx.CrackLength(scene.debonds[0].interface, 34.0)
@@ -151,9 +151,9 @@ def test_history_of_chosen_bonds(shared_path: Path, comm: MPI.Intracomm) -> None
     assert status[0] == 1.0 and status[-1] == 0.0 and (np.diff(status) <= 1e-12).all()
     assert set(status.round(9)) == {1.0, 0.75, 0.5, 0.25, 0.0}
     assert {row["time"] for row in seen.rows} == set(history["time"])
-    last = every.rows[-scene.growths[0].n_released :]
-    assert [row["node"] for row in last] == [r.node for r in scene.growths[0].records]
-    assert [row["DBT"] for row in last] == [r.DBT for r in scene.growths[0].records]
+    last = every.rows[-scene.cracks[0].n_released :]
+    assert [row["node"] for row in last] == [r.node for r in scene.cracks[0].records]
+    assert [row["DBT"] for row in last] == [r.DBT for r in scene.cracks[0].records]
     seen.to_csv(shared_path / "bonds.csv")
     fx.write_releases(scene, shared_path / "releases.csv")
     if comm.rank == 0:

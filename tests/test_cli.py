@@ -125,7 +125,8 @@ def test_any_other_error_keeps_its_traceback(monkeypatch: pytest.MonkeyPatch) ->
 
 _BROKEN = """
 from mpi4py import MPI
-from fxcrack import cli, errors
+from fxcrack import cli
+from fxcrack.base import errors
 cli._PATIENCE = {patience}
 def broken():
     if MPI.COMM_WORLD.rank in {ranks}:

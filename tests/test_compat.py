@@ -17,7 +17,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack as fx
-from fxcrack import compat
+from fxcrack.base import compat
 from fxcrack.meshes.dcb import dcb_2d
 
 CELLS = ["triangle", "quadrilateral", "tetrahedron", "hexahedron"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fxcrack import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
 import dolfinx.fem
 import numpy as np
 import numpy.typing as npt
@@ -13,14 +13,14 @@ from mpi4py import MPI
 from specimens import gathered, gathered_vector
 
 import fxcrack as fx
-from fxcrack.continuum import Continuum
-from fxcrack.errors import InputError
-from fxcrack.loads import Load, constant
-from fxcrack.materials import strain_rotation
+from fxcrack.base.errors import InputError
+from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import Load, constant
+from fxcrack.continuum.materials import strain_rotation
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.penny import penny
-from fxcrack.solve.borders import border_vectors
 
 Array = npt.NDArray[np.float64]
 
@@ -312,6 +312,6 @@ def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
     )
     refused(
         r"Monitor\('u_top'\): direction has 2 components, 3 are needed",
-        lambda: border_vectors(solid, [], [fx.Monitor("top", (0.0, 1.0))]),
+        lambda: load_and_monitor_vectors(solid, [], [fx.Monitor("top", (0.0, 1.0))]),
     )
     refused("dimension 1 is needed here", lambda: plane.load_vector(fx.Pressure("pin_top", 1.0)))

@@ -18,13 +18,13 @@ from specimens import assert_same, dcb3
 from typer.testing import CliRunner
 
 import fxcrack as fx
+from fxcrack.base.errors import InputError
+from fxcrack.base.machine import machine_memory_mb, machine_name
 from fxcrack.bench import fit, scale_report
+from fxcrack.bench.cost import Constants, Law, Task, advise, estimate, shipped
 from fxcrack.bench.rates import dense_rate, unshared_rate
 from fxcrack.bench.scale import Case, measure, suite
 from fxcrack.cli import app
-from fxcrack.errors import InputError
-from fxcrack.solve.cost import Constants, Law, Task, advise, estimate, shipped
-from fxcrack.solve.machine import machine_memory_mb, machine_name
 
 
 def case(shape: str, dofs: float, method: str, **more: Any) -> dict[str, Any]:
@@ -161,16 +161,16 @@ def test_iteration_where_a_factorisation_would_not_fit(
     until = fx.Static(until=fx.Releases(1))
     sizes = {"dx": 5.0, "dy": 5.0, "ny": 1}
     one = dcb3(comm, **sizes)
-    monkeypatch.setattr("fxcrack.solve.window_model.machine_memory_mb", lambda comm: 1.0)
+    monkeypatch.setattr("fxcrack.solvers.base.machine_memory_mb", lambda comm: 1.0)
     with caplog.at_level(logging.WARNING, "fxcrack"):
         other = dcb3(comm, **sizes)
     if comm.rank == 0:
         assert "GB there are: the iterative method is used" in caplog.text
-    assert one.model.columns is None and other.model.columns is not None
+    assert one.solver.columns is None and other.solver.columns is not None
     insisting = dcb3(comm, **sizes, options=fx.CondensedOptions(method="schur"))
-    assert insisting.model.columns is None
+    assert insisting.solver.columns is None
     histories = [s.run(until, progress=False) for s in (one, other)]
-    assert_same(*histories, 1e-6)  # see test_solve_iterative.py
+    assert_same(*histories, 1e-6)  # see test_condensation_iterative.py
     for scene in (one, other, insisting):
         scene.close()
 

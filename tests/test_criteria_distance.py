@@ -12,14 +12,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
     CrackLengthVsTime,
     CrackOpening,
     CriticalStress,
     Tabulated,
 )
-from fxcrack.criteria.path import locate
-from fxcrack.errors import InputError
+from fxcrack.interface.surface_paths import locate
 
 Array = npt.NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def test_critical_stress_by_hand() -> None:
     criterion = CriticalStress(10.0, 20.0, 50.0, distance=1.0)
     t = [[6.0, 16.0, 0.0], [-6.0, 16.0, 0.0], [0.0, 0.0, -25.0], [6.0, 12.0, 26.457513110645905]]
     assert criterion.value(t) == pytest.approx([1.0, 0.8, 0.5, 1.0], rel=ROUND_OFF)
-    assert criterion.window == (0.9, 1.1)
+    assert criterion.release_range == (0.9, 1.1)
     assert CriticalStress.allows_normal_only
 
 
@@ -278,7 +278,7 @@ def test_critical_opening_against_crack_length() -> None:
     # Not extrapolated: the end values hold outside.
     assert criterion.critical_at([-1.0, 0.0, 1.0, 5.0]) == pytest.approx([0.1, 0.1, 0.2, 0.3])
     assert criterion.value([0.1, 0.1, -1.0], [0.0, 1.0, 0.0]) == pytest.approx([1.0, 0.5, 0.0])
-    assert criterion.window == (0.9, 1.1) and CrackOpening.allows_normal_only
+    assert criterion.release_range == (0.9, 1.1) and CrackOpening.allows_normal_only
 
 
 def test_symmetry_halves_the_critical_opening_and_needs_a_normal_bond() -> None:
@@ -299,7 +299,7 @@ def test_crack_length_by_hand() -> None:
     # Tips at 11 and 12, nodes 1 and 0.5 behind; l(1.5) = 11.
     assert CURVE.value(1.5, [11.0, 12.0], [1.0, 0.5]) == pytest.approx([1.0, -1.0])
     assert CURVE.value(1.25, [11.0], [1.0]) == pytest.approx([0.5])
-    assert CURVE.window == (0.9, 1.1) and CrackLengthVsTime.allows_normal_only
+    assert CURVE.release_range == (0.9, 1.1) and CrackLengthVsTime.allows_normal_only
 
 
 def test_no_extrapolation() -> None:

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from fxcrack.base.errors import InputError
 from fxcrack.criteria import BK, Fatigue, Paris, Regime, cycle_jump
-from fxcrack.errors import InputError
 
 Array = npt.NDArray[np.float64]
 

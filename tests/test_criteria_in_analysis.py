@@ -13,7 +13,7 @@ from mpi4py import MPI
 import fxcrack as fx
 from fxcrack.demos import center_crack as demo
 from fxcrack.interface.front import Front
-from fxcrack.interface.path import SurfacePaths
+from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
 from fxcrack.meshes.center_crack import center_crack
@@ -25,7 +25,7 @@ from fxcrack.output.interface_fields import interface_fields
 Array = npt.NDArray[np.float64]
 
 STEEL = fx.Isotropic(E=200e3, nu=0.3)
-STEP = fx.Step()
+STEP = fx.StepRelease()
 A = 1.0
 ROUND_OFF = 1e-9  # linear pieces, each solved to 1e-13 or so, some dozens one after another
 TENSION = [fx.Traction("top", (0.0, 1.0)), fx.Traction("bottom", (0.0, -1.0))]
@@ -104,7 +104,7 @@ def onset(scene: fx.Scene) -> float:
 def release_times(scene: fx.Scene) -> dict[float, float]:
     """Time of release by the x of the node."""
     x = scene.pairs[0].surface.x[:, 0]
-    return {round(float(x[n]), 9): t for n, t in scene.growths[0].released}
+    return {round(float(x[n]), 9): t for n, t in scene.cracks[0].released}
 
 
 def assert_balanced(history: fx.History) -> None:
@@ -337,13 +337,13 @@ def test_reference_point_and_tip_that_move_are_followed() -> None:
             if event != "onset":
                 return
             (fields,) = interface_fields(scene, displacement_function(scene), row["time"])
-            first = scene.growths[0].paths.initial[0]
+            first = scene.cracks[0].paths.initial[0]
             pin = np.array([0.0, 1.5 + row["u[pin_top.y]"], 0.0])
             tip = scene.pairs[0].surface.x[first] + fields.displacement[first]
             seen.append(float(np.linalg.norm(tip - pin)) + row["a[bond]"] - 10.0)
 
         scene.run(fx.Static(until=fx.Time(0.9)), observers=[look])
-        times = np.array([t for _, t in scene.growths[0].released])
+        times = np.array([t for _, t in scene.cracks[0].released])
         assert len(times) >= 4
         assert_balanced(scene.history)
         found.append((times, np.array(seen)))
@@ -359,7 +359,7 @@ def test_front_of_a_solid_follows_the_curve() -> None:
     scene = beam(criterion, solid=True)
     run(scene, fx.Time(0.99))
     surface = scene.pairs[0].surface
-    times = dict(scene.growths[0].released)
+    times = dict(scene.cracks[0].released)
     for node in np.flatnonzero(surface.x[:, 0] >= 10.0 - 1e-9):
         x, _, z = surface.x[node]
         length = np.sqrt(10.0**2 + 1.5**2 + (z - 2.0) ** 2) + x - 10.0

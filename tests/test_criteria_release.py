@@ -11,42 +11,48 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
     AmplitudeRelease,
-    Progressive,
-    Ramp,
-    Step,
+    ProgressiveRelease,
+    RampRelease,
+    StepRelease,
 )
-from fxcrack.errors import InputError
-from fxcrack.solve.soft_bond import SoftBond
-from fxcrack.steps.letting_go import ViscousRelease
+from fxcrack.equilibrium.cohesive_law import CohesiveBond
+from fxcrack.steps.force_ramps import ViscousRamp
 
 Array = npt.NDArray[np.float64]
 
 ROUND_OFF = 1e-12  # a few roundings of well-scaled numbers
 
 
-def bond(strength: float = 1.0, final: float = 1.0, largest: float | None = None) -> SoftBond:
+def bond(strength: float = 1.0, final: float = 1.0, largest: float | None = None) -> CohesiveBond:
     """A bond that softens along its only component."""
-    return SoftBond(
+    return CohesiveBond(
         np.array([0]), np.array([1.0]), strength, final, (0, np.array([0]), np.array([0])), largest
     )
 
 
 def test_step_holds_in_its_increment_and_goes_in_the_next() -> None:
-    assert Step().remaining([0, 1, 2]).tolist() == [1.0, 0.0, 0.0]
-    assert Step().driver == "increments"
+    assert StepRelease().remaining([0, 1, 2]).tolist() == [1.0, 0.0, 0.0]
+    assert StepRelease().driver == "increments"
 
 
 def test_ramp_over_increments_or_opening() -> None:
-    assert Ramp(4).remaining([0, 1, 2, 4, 5]).tolist() == [1.0, 0.75, 0.5, 0.0, 0.0]
-    assert Ramp(4).driver == "increments" and Ramp().driver == "opening"
-    assert Ramp().remaining([0.0, 0.25, 1.0, 2.0]).tolist() == [1.0, 0.75, 0.0, 0.0]
+    assert RampRelease(4).remaining([0, 1, 2, 4, 5]).tolist() == [1.0, 0.75, 0.5, 0.0, 0.0]
+    assert RampRelease(4).driver == "increments" and RampRelease().driver == "opening"
+    assert RampRelease().remaining([0.0, 0.25, 1.0, 2.0]).tolist() == [1.0, 0.75, 0.0, 0.0]
 
 
 def test_progressive_starts_whole_and_ends_at_the_final_opening() -> None:
-    assert Progressive().remaining([-0.5, 0.0, 0.25, 1.0, 2.0]).tolist() == [1, 1, 0.75, 0, 0]
-    assert Progressive().driver == "opening"
+    assert ProgressiveRelease().remaining([-0.5, 0.0, 0.25, 1.0, 2.0]).tolist() == [
+        1,
+        1,
+        0.75,
+        0,
+        0,
+    ]
+    assert ProgressiveRelease().driver == "opening"
 
 
 @given(st.floats(0.1, 100.0), st.floats(0.01, 10.0), st.floats(0.1, 1.0))
@@ -56,7 +62,7 @@ def test_softening_bond_follows_the_law_and_spends_its_area(
     soft, w = bond(force, final), np.linspace(0.0, part * final, 11)
     along = np.array([soft.force(float(x)) for x in w])
     np.testing.assert_allclose(
-        along, force * Progressive().remaining(w / final), atol=1e-12 * force
+        along, force * ProgressiveRelease().remaining(w / final), atol=1e-12 * force
     )
     # exact for a straight line; all of 1/2 F0 w_f at the end
     assert np.trapezoid(along, w) == pytest.approx(soft.taken(w[-1]), rel=ROUND_OFF)
@@ -100,8 +106,8 @@ def test_amplitude_release() -> None:
         (lambda: AmplitudeRelease([0, 1, 1], [1, 0.5, 0]), "times must increase"),
         (lambda: AmplitudeRelease([0, 1], [1, math.nan]), r"fractions\[1\] = nan"),
         (lambda: AmplitudeRelease([0, 1], [1, 0], 0.0), "first_increment = 0.0 must be positive"),
-        (lambda: Ramp(0), "Ramp: increments = 0 must be a whole number, at least 1"),
-        (lambda: Ramp(2.5), "Ramp: increments = 2.5 must be a whole number"),  # type: ignore[arg-type]
+        (lambda: RampRelease(0), "Ramp: increments = 0 must be a whole number, at least 1"),
+        (lambda: RampRelease(2.5), "Ramp: increments = 2.5 must be a whole number"),  # type: ignore[arg-type]
     ],
 )
 def test_bad_laws_are_refused_when_written(make: Any, says: str) -> None:
@@ -112,9 +118,9 @@ def test_bad_laws_are_refused_when_written(make: Any, says: str) -> None:
 # --- viscosity ------------------------------------------------------------------------------------
 
 
-def viscous(viscosity: float, remaining: float = 1.0) -> ViscousRelease:
+def viscous(viscosity: float, remaining: float = 1.0) -> ViscousRamp:
     nodes = np.array([0])
-    return ViscousRelease(0, nodes, np.array([[1.0, 0.0]]), viscosity, 0.0, remaining)
+    return ViscousRamp(0, nodes, np.array([[1.0, 0.0]]), viscosity, 0.0, remaining)
 
 
 def test_viscous_release_lags_and_catches_up() -> None:

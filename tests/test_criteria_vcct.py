@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
     BK,
     VCCT,
@@ -22,7 +23,6 @@ from fxcrack.criteria import (
     closure_rates,
     energy_release_rates,
 )
-from fxcrack.errors import InputError
 
 Array = npt.NDArray[np.float64]
 
@@ -353,7 +353,7 @@ def test_one_toughness_needs_no_law(mix: Any) -> None:
 
 
 def test_windows() -> None:
-    assert VCCT(0.2).window == (1.0, 1.2)
+    assert VCCT(0.2).release_range == (1.0, 1.2)
     assert not VCCT.allows_normal_only
 
 

@@ -73,10 +73,10 @@ def test_slow_dynamics_is_the_quasi_static_answer(comm: MPI.Intracomm, contact: 
     still, moved = histories
     assert still.reason == moved.reason and "crack length" in still.reason
     first = [r for r in moved if r["event"] == "release"]
-    at_rest = column(onsets(still), "time")
-    assert len(first) == len(at_rest) == 2
+    checkpoint_point = column(onsets(still), "time")
+    assert len(first) == len(checkpoint_point) == 2
     # a release comes at the end of an increment of 0.02 or less, and opens over the next one
-    late = column(first, "time") - at_rest
+    late = column(first, "time") - checkpoint_point
     assert (late > -1e-9).all() and (late < 0.04).all()
     assert moved["kinetic_energy"].astype(float).max() < 1e-3 * moved["external_work"][-1]
     # contact that closes within an increment does work by the trapezoidal rule

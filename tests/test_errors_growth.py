@@ -12,7 +12,7 @@ import pytest
 from test_criteria_in_analysis import STEEL, STRETCH, beyond_crack, outside_two_cracks, plate, run
 
 import fxcrack as fx
-from fxcrack.errors import InterfaceError
+from fxcrack.base.errors import InterfaceError
 from fxcrack.meshes.center_crack import center_crack
 
 STRESS = fx.CriticalStress(100.0, distance=0.25)
@@ -60,12 +60,12 @@ REFUSED: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
         ("interface 'bond'", "AmplitudeRelease is not possible with VCCT", "Step, Ramp or"),
     ),
     "progressive without toughness": (
-        lambda: fx.Debond(interface(), STRESS, fx.Progressive()),
+        lambda: fx.Debond(interface(), STRESS, fx.ProgressiveRelease()),
         ("Progressive is not possible with CriticalStress", "Step or AmplitudeRelease"),
     ),
     "ramp with crack length": (
         lambda: fx.Debond(
-            interface(), fx.CrackLengthVsTime((0.0,), (1.0,), reference="top"), fx.OpeningRamp()
+            interface(), fx.CrackLengthVsTime((0.0,), (1.0,), reference="top"), fx.RampRelease()
         ),
         ("Ramp is not possible with CrackLengthVsTime",),
     ),
@@ -171,7 +171,7 @@ def test_first_tabulated_length_beyond_the_first_bonded_node(
     for word in ("interface 'bond'", "first tabulated crack length 1.2", "distance 1 from",
                  "'upper_face'", "all of 2 tips will never propagate"):  # fmt: skip
         assert word in warnings(caplog)
-    assert scene.growths[0].n_released == 0
+    assert scene.cracks[0].n_released == 0
     assert history["f[bond]"].max() == 0.0
 
 
@@ -180,7 +180,7 @@ def test_one_tip_that_never_propagates(caplog: pytest.LogCaptureFixture) -> None
     scene = plate(fx.CrackLengthVsTime((0.0, 1.0), (2.0, 4.0), reference="left"))
     run(scene, fx.Time(1.0))
     assert "1 of 2 tips will never propagate" in warnings(caplog)
-    x = scene.pairs[0].surface.x[[n for n, _ in scene.growths[0].released], 0]
+    x = scene.pairs[0].surface.x[[n for n, _ in scene.cracks[0].released], 0]
     assert len(x)
     assert (x >= 1.0 - 1e-9).all()
 
@@ -196,7 +196,7 @@ def test_set_with_nodes_off_the_surface(caplog: pytest.LogCaptureFixture) -> Non
     scene = scene_of(fx.Debond(interface(bonded="right"), STRESS))
     # 21 nodes on each body's right side, of which the upper body's lowest one is a slave
     assert "nodes of bonded set 'right' are not slave nodes" in warnings(caplog)
-    assert scene.model.fronts[0].bonded.sum() == 1
+    assert scene.solver.fronts[0].bonded.sum() == 1
 
 
 def test_no_set_bonds_everything(caplog: pytest.LogCaptureFixture) -> None:
@@ -205,7 +205,7 @@ def test_no_set_bonds_everything(caplog: pytest.LogCaptureFixture) -> None:
     history = run(scene, fx.Releases(1))
     assert "'bond' has no crack tip" in warnings(caplog)
     assert history.reason == "no crack tip is left"
-    assert scene.model.fronts[0].bonded.all()
+    assert scene.solver.fronts[0].bonded.all()
 
 
 def test_nothing_bonded_has_no_tip(caplog: pytest.LogCaptureFixture) -> None:

@@ -46,7 +46,7 @@ def test_cycles_add_up_to_the_sum_of_the_law():
     np.testing.assert_allclose(tips["a"], a[:-1], rtol=1e-12)
     assert all(tips["released"]) and set(tips["interface"]) == {"bond"}
     # and the cycle in which each bond failed
-    np.testing.assert_allclose([r.DBT for r in scene.growths[0].records], N[1:], rtol=1e-12)
+    np.testing.assert_allclose([r.DBT for r in scene.cracks[0].records], N[1:], rtol=1e-12)
     assert history.reason == "crack length 40 of 'bond' reached"
     assert history.details["factorizations"] == 1
     assert largest_imbalance(history) < 1e-9  # bonds let go at the maximum; all is linear
@@ -209,7 +209,7 @@ def test_a_crack_runs_out_of_its_interface():
     )
     history = scene.run(fx.Cycles(maximum=u, minimum=0.0))
     assert history.reason == "no crack tip is left"
-    assert scene.fatigue.N > 0.0 and not scene.model.fronts[0].bonded.any()
+    assert scene.fatigue.N > 0.0 and not scene.solver.fronts[0].bonded.any()
     inside = [r for r in history if r["event"] in GROWS and r["a[bond]"] < 11.0]
     # exact but for the exponential decay towards the far end, 6 heights away
     np.testing.assert_allclose(column(inside, "G_max[bond]"), modulus * u**2 / height, rtol=1e-3)
@@ -269,7 +269,7 @@ def test_criterion_and_step_must_go_together(comm):
     with pytest.raises(fx.InputError, match=r"criterion VCCT, which does not grow in cycles"):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1))
     scene.close()
-    scene = fatigue_specimen(comm, release=fx.Progressive())
+    scene = fatigue_specimen(comm, release=fx.ProgressiveRelease())
     with pytest.raises(fx.InputError, match=r"let go at once; use release=Step\(\)"):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1))
     scene.close()

@@ -35,11 +35,11 @@ from fxcrack.meshes.penny import penny
 
 def sampled(scene: fx.Scene, corners: list[np.ndarray], n: int = 101) -> tuple[float, float]:
     """Extremes of G over equilibria sampled along the way of the loads."""
-    system, growth = scene.model.system, scene.growths[0]
-    tips, saved, found = growth.tips(), scene.model.system.snapshot(), []
+    system, growth = scene.solver.system, scene.cracks[0]
+    tips, saved, found = growth.tips(), scene.solver.system.snapshot(), []
     for a, b in pairwise(corners):
         for x in np.linspace(0.0, 1.0, n):
-            state = system.equilibrium((1.0 - x) * a + x * b, np.zeros(system.n_window))
+            state = system.equilibrium((1.0 - x) * a + x * b, np.zeros(system.n_retained))
             measured = growth.evaluator.measure(tips, state, 0.0)
             found.append(float(total(growth.evaluator.rates(tips, measured))[0]))
     system.restore(saved)
@@ -221,11 +221,11 @@ def test_static_growth_cycles_and_static_growth_in_turn(comm):
 def test_cycles_beside_bonds_that_soften():
     # a progressive front half-way through its elements stays as it is while another one is cycled
     scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue_law())])
-    scene.debonds[0] = fx.Debond(one, fx.VCCT(GIc=0.2), release=fx.Progressive())
+    scene.debonds[0] = fx.Debond(one, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())
     brittle, tired = scene.debonds
     scene.run(fx.Static(until=fx.CrackLength(one, 32.0)), grow=[brittle])
     before = scene.history.rows[-1]
-    assert scene.model.system.soft.bonds
+    assert scene.solver.system.soft.bonds
     maximum = before["time"]
     history = scene.run(fx.Cycles(maximum=maximum, ratio=0.1, n_max=2000.0), grow=[tired])
     rows = [r for r in history if "dG[bond1]" in r]
@@ -292,7 +292,7 @@ def test_a_front_in_3d_stays_symmetric_and_keeps_its_energy():
         history = scene.run(fx.Cycles(maximum=0.3, ratio=0.1, until=until_length(scene, 11.0)))
         x = scene.pairs[0].surface.x
         mirror = np.array([np.argmin(np.abs(x - [p[0], p[1], 8.0 - p[2]]).sum(axis=1)) for p in x])
-        is_open = ~scene.model.fronts[0].bonded
+        is_open = ~scene.solver.fronts[0].bonded
         np.testing.assert_array_equal(is_open, is_open[mirror])
         assert largest_imbalance(history) < 1e-9
         assert history.details["factorizations"] <= 2

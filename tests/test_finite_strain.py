@@ -50,10 +50,10 @@ def test_shear_of_a_pressed_unit_in_a_turned_specimen() -> None:
         )
         return scene.run(fx.Static(until=fx.Time(2.0)))[-1]
 
-    at_rest, turned = run(0.0), run(np.radians(80.0))
-    assert at_rest["GI[bond]"] == turned["GI[bond]"] == 0.0
-    assert at_rest["GII[bond]"] > 1e-4
-    assert turned["GII[bond]"] == pytest.approx(at_rest["GII[bond]"], rel=1e-6)
+    checkpoint_point, turned = run(0.0), run(np.radians(80.0))
+    assert checkpoint_point["GI[bond]"] == turned["GI[bond]"] == 0.0
+    assert checkpoint_point["GII[bond]"] > 1e-4
+    assert turned["GII[bond]"] == pytest.approx(checkpoint_point["GII[bond]"], rel=1e-6)
 
 
 @pytest.mark.parametrize("degrees", [80.0, 170.0])
@@ -86,9 +86,9 @@ def test_a_turned_specimen_cracks_like_one_at_rest(
         )
         return scene.run(fx.Static(until=[fx.Releases(3), fx.Time(2.0)]))
 
-    at_rest, turned = run(0.0), run(np.radians(degrees))
-    assert len(onsets(at_rest)) == len(onsets(turned)) >= 2
-    for one, other in zip(onsets(at_rest), onsets(turned), strict=True):
+    checkpoint_point, turned = run(0.0), run(np.radians(degrees))
+    assert len(onsets(checkpoint_point)) == len(onsets(turned)) >= 2
+    for one, other in zip(onsets(checkpoint_point), onsets(turned), strict=True):
         # f = 1 is met to 1e-9 and the iteration to 1e-10 of the forces
         assert other["time"] == pytest.approx(one["time"], rel=1e-7)
         for name in quantities:
@@ -167,13 +167,13 @@ def test_so_do_faces_that_slide_with_inertia() -> None:
 
 def test_an_increment_that_is_undone_gives_the_old_pairing_back() -> None:
     scene, _ = slid(MPI.COMM_SELF, 1.3, 0.1)
-    model = scene.model
+    model = scene.solver
     model.renew_pairs()
     model.settle(model.state.force)
     state, saved, u = model.state, model.remember(), model.u.array.copy()
     pair, energy = model.pairs[0], model.pairing_energy
     model.move(scene.loads_at(1.5), state.force, 1.5, 0.2)
-    model.accept()
+    model.commit()
     assert model.renew_pairs()
     model.settle(model.state.force)
     assert model.pairs[0] is not pair and model.pairing_energy != energy

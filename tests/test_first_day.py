@@ -112,7 +112,7 @@ def test_classes_where_their_instances_belong() -> None:
     with pytest.raises(fx.InputError, match="is no mode-mix law; give one with its exponents"):
         fx.VCCT(GIc=0.2, GIIc=0.5, mix=fx.BK)
     with pytest.raises(fx.InputError, match=r"interface 'bond': release = .*is no release law"):
-        fx.Debond(bond(30.0), fx.VCCT(GIc=0.2), fx.Progressive)
+        fx.Debond(bond(30.0), fx.VCCT(GIc=0.2), fx.ProgressiveRelease)
 
 
 def test_bonded_by_a_chain_of_comparisons(comm: MPI.Comm) -> None:

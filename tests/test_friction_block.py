@@ -10,8 +10,9 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 
-from fxcrack.errors import ConvergenceError
-from fxcrack.solve.coulomb import (
+from fxcrack.base.errors import ConvergenceError
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, work_between
+from fxcrack.equilibrium.coulomb import (
     OPEN,
     SLIP,
     STICK,
@@ -20,8 +21,7 @@ from fxcrack.solve.coulomb import (
     NodeStates,
     backward_euler,
 )
-from fxcrack.solve.friction import Friction
-from fxcrack.solve.jump_system import Equilibrium, JumpSystem, work_between
+from fxcrack.equilibrium.friction import Friction
 
 Array = npt.NDArray[np.float64]
 
@@ -98,7 +98,7 @@ def test_a_turned_tangent_frame_turns_the_answer(seed: int, angle: float) -> Non
     assert two.jump == pytest.approx(one.jump @ turn.T, abs=1e-6)  # S is 100 times softer than p
 
 
-def system_of(block: ContactBlock, seed: int) -> tuple[JumpSystem, Array]:
+def system_of(block: ContactBlock, seed: int) -> tuple[ContactSystem, Array]:
     """A jump system with the block as its window, two supports, and a target for them."""
     rng = np.random.default_rng(seed)
     n = len(block.stiffness)
@@ -107,7 +107,7 @@ def system_of(block: ContactBlock, seed: int) -> tuple[JumpSystem, Array]:
     columns[::d, 0] = np.abs(columns[::d, 0])
     own = columns.T @ np.linalg.solve(block.stiffness, columns) + np.eye(2)
     schur = np.block([[block.stiffness, columns], [columns.T, own]])
-    system = JumpSystem(schur, n, 2, 0)
+    system = ContactSystem(schur, n, 2, 0)
     system.gap[::d] = block.gap
     system.contact[::d] = True
     friction = Friction(d)
@@ -121,17 +121,17 @@ def system_of(block: ContactBlock, seed: int) -> tuple[JumpSystem, Array]:
         states.direction,
         np.zeros((m, d - 1)),
     )
-    system.rub(friction)
+    system.set_friction(friction)
     return system, columns
 
 
 def follow(
-    system: JumpSystem, state: Equilibrium, loads: Array, block: ContactBlock
+    system: ContactSystem, state: Equilibrium, loads: Array, block: ContactBlock
 ) -> tuple[Equilibrium, float, float]:
     """Follow to loads; the end, the work and the energy friction took."""
     friction = system.friction
     assert friction is not None
-    none = np.zeros(system.n_window)
+    none = np.zeros(system.n_retained)
     work = taken = 0.0
     for _, point in system.pieces(state, loads, none):
         p = friction.traction(system, point)
@@ -159,7 +159,7 @@ def legs(seed: int, m: int, d: int) -> tuple[float, float, float]:
     block, _, _ = random_block(seed, m, d, weak=True)
     system, _ = system_of(block, seed)
     rng = np.random.default_rng(seed + 1)
-    state = system.equilibrium(np.zeros(2), np.zeros(system.n_window))
+    state = system.equilibrium(np.zeros(2), np.zeros(system.n_retained))
     work = taken = 0.0
     for _ in range(4):
         state, w, t = follow(system, state, rng.standard_normal(2), block)
@@ -189,7 +189,7 @@ def test_many_increments_come_to_the_exact_path(seed: int, m: int) -> None:
     system, _ = system_of(block, seed)
     friction = system.friction
     assert friction is not None
-    none = np.zeros(system.n_window)
+    none = np.zeros(system.n_retained)
     start = system.equilibrium(np.zeros(2), none)
     target = np.array([0.8, 0.4])
     saved = system.snapshot()
@@ -206,7 +206,7 @@ def test_many_increments_come_to_the_exact_path(seed: int, m: int) -> None:
 def test_a_spring_pulls_a_block_that_sticks_slips_and_sticks_again():
     # one node pressed by 2, mu = 0.25, tangential stiffness 1, pulled by u: slips at u = 0.5
     block = ContactBlock(np.diag([1.0, 1.0]), np.zeros(1), np.array([0.25]))
-    system = JumpSystem(
+    system = ContactSystem(
         np.array([[1.0, 0, 2.0, 0], [0, 1.0, 0, -1.0], [2.0, 0, 9.0, 0], [0, -1.0, 0, 1.0]]),
         2, 2, 0,
     )  # fmt: skip
@@ -216,7 +216,7 @@ def test_a_spring_pulls_a_block_that_sticks_slips_and_sticks_again():
         np.array([[0, 1]]), np.zeros((1, 2), dtype=int), block.mu, block.gap,
         np.array([STICK]), np.ones((1, 1)), np.zeros((1, 1)),
     )  # fmt: skip
-    system.rub(friction)
+    system.set_friction(friction)
     state = system.equilibrium(np.array([1.0, 0.0]), np.zeros(2))
     for target, slip, force, taken in [
         (0.4, 0.0, -0.4, 0.0),
@@ -249,7 +249,7 @@ def test_a_body_that_slides_away_is_an_error_in_words():
 def test_states_survive_a_snapshot():
     block, _, _ = random_block(3, 5, 2, weak=True)
     system, _ = system_of(block, 3)
-    none = np.zeros(system.n_window)
+    none = np.zeros(system.n_retained)
     start = system.equilibrium(np.zeros(2), none)
     half, _, _ = follow(system, start, np.array([0.7, -0.4]), block)
     saved = system.snapshot()

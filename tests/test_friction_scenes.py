@@ -14,8 +14,8 @@ from scipy.optimize import brentq
 from specimens import assert_same, largest_imbalance
 
 import fxcrack as fx
+from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.demos.enf import ARMS, G_IIC
-from fxcrack.errors import InputError, InterfaceError
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.enf import enf_2d
 
@@ -40,9 +40,9 @@ def faces(mu: Any, **options: Any) -> fx.Interface:
 
 def tractions(scene: fx.Scene) -> Array:
     """Forces of contact on the slave nodes, shape (m, d)."""
-    system = scene.model.system
+    system = scene.solver.system
     assert system.friction is not None
-    return system.friction.traction(system, scene.model.state)
+    return system.friction.traction(system, scene.solver.state)
 
 
 # -- words ---------------------------------------------------------------------------------
@@ -81,7 +81,7 @@ def test_progressive_release_beside_friction_is_refused(comm: MPI.Intracomm) -> 
             materials=fx.Isotropic(1000.0, 0.3),
             model=fx.PlaneStrain(),
             supports=[fx.Displacement("bottom", x=0.0, y=0.0)],
-            debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2), release=fx.Progressive())],
+            debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())],
         )
 
 
@@ -158,9 +158,9 @@ def test_the_slip_of_a_pulled_block_is_what_elasticity_leaves(comm: MPI.Intracom
     jumps, spent = [], []
     for time in (1.9, 2.0):
         history = scene.run(fx.Static(until=fx.Time(time)))
-        friction = scene.model.system.friction
+        friction = scene.solver.system.friction
         assert friction is not None
-        jumps.append(friction.of(scene.model.state.jump)[:, 1])
+        jumps.append(friction.of(scene.solver.state.jump)[:, 1])
         spent.append(history.rows[-1]["friction_energy"])
     # once all of it slides, it moves as a whole: by what the pulled face moves
     assert np.abs(jumps[1] - jumps[0]) == pytest.approx(np.full(4, 0.004), rel=1e-9)
@@ -176,7 +176,7 @@ def test_in_space_the_block_slides_as_well_and_the_balance_closes(comm: MPI.Intr
     # the lateral strain lets some nodes slip a little sideways
     assert abs(history.rows[-1]["R[pull.x]"]) == pytest.approx(MU * 40.0, rel=0.01)
     assert largest_imbalance(history) < 1e-9  # contact does not change on the way
-    friction = scene.model.system.friction
+    friction = scene.solver.system.friction
     assert friction is not None
     # both rules for the dissipation agree to 3 %: increments are halved until they agree to 5 %
     assert friction.error < 0.03 * history.rows[-1]["friction_energy"]
@@ -201,7 +201,7 @@ def test_the_nonlinear_path_gives_the_same(comm: MPI.Intracomm) -> None:
 
 def test_slips_are_committed_in_the_jumps_of_a_renewed_pairing() -> None:
     scene = pulled(MPI.COMM_SELF, 2, effects=[fx.FiniteStrain()])
-    model, renewals, renew = scene.model, [], scene.model.renew_pairs  # type: ignore[attr-defined]
+    model, renewals, renew = scene.solver, [], scene.solver.renew_pairs  # type: ignore[attr-defined]
 
     def watched() -> bool:
         changed = bool(renew())
@@ -263,7 +263,7 @@ def cylinder(n: int = 120, ny: int = 24, *, smallest: float = 0.05, shift: float
 
 def contact_line(scene: fx.Scene) -> tuple[Array, Array, Array]:
     """Positions along the line, tractions, and whether nodes stick, in order."""
-    friction = scene.model.system.friction
+    friction = scene.solver.system.friction
     assert friction is not None
     nodes = friction.where[:, 1]
     surface = scene.pairs[0].surface

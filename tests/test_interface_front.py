@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from specimens import tensor_surface
 
-from fxcrack.errors import InterfaceError
-from fxcrack.interface.extent import CrackExtent
+from fxcrack.base.errors import InterfaceError
+from fxcrack.interface.crack_extent import CrackExtent
 from fxcrack.interface.front import Front
 from fxcrack.interface.surface import FacetSurface
-from fxcrack.interface.tip import Tips
+from fxcrack.interface.tips import Tips
 
 Array = npt.NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from mpi4py import MPI
 from specimens import STEEL, bond, gathered, specimen
 
 import fxcrack as fx
-from fxcrack.continuum import Continuum
-from fxcrack.errors import InputError, InterfaceError
-from fxcrack.interface.jumps import WINDOW, JumpCoordinates, build_coordinates
+from fxcrack.base.errors import InputError, InterfaceError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.interface.jump_coordinates import RETAINED, JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair, make_pair
 from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
@@ -64,7 +64,7 @@ def coordinates(
     model = fx.PlaneStrain() if mesh.gdim == 2 else fx.Solid()
     continuum = Continuum(mesh, STEEL, model)
     pairs = [make_pair(continuum, i) for i in interfaces]
-    roles = [np.full((p.surface.n_nodes, mesh.gdim), WINDOW, dtype=np.int8) for p in pairs]
+    roles = [np.full((p.surface.n_nodes, mesh.gdim), RETAINED, dtype=np.int8) for p in pairs]
     columns = collect_supports(continuum, list(supports))
     found = build_coordinates(continuum, pairs, roles, columns, 0)
     transform = gathered(found.transform).toarray()
@@ -191,7 +191,7 @@ def test_support_shared_by_slave_and_master(comm: MPI.Intracomm) -> None:
     assert found.index[0][corner, 1] == -1 and found.index[0][corner, 0] >= 0
     assert found.held[0].sum() == 1
     q = np.zeros(t.shape[1])
-    amplitudes = found.first + found.n_window + np.arange(3)
+    amplitudes = found.first + found.n_retained + np.arange(3)
     q[amplitudes] = [0.25, 0.25, 1.0]  # two displacements, and the factor of the ramp
     u = (t @ q).reshape(-1, 2)
     assert u[pair.surface.dofs[corner]] == pytest.approx([0.25, 0.0], abs=ROUND_OFF)
@@ -236,7 +236,7 @@ def test_frames_turn_to_supports_along_the_interface() -> None:
         # no column moves a held component
         for axis in held:
             rows = 3 * pair.surface.dofs[at_end] + "xyz".index(axis)
-            inner = t[:, : found.first + found.n_window]  # one rank: supports come last
+            inner = t[:, : found.first + found.n_retained]  # one rank: supports come last
             assert inner[rows] == pytest.approx(
                 np.zeros((len(rows), inner.shape[1])), abs=ROUND_OFF
             )

@@ -71,7 +71,7 @@ def error(mesh: Mesh, load: str, interface: fx.Interface) -> float:
         bonds=[interface],
     )
     scene.run(fx.Static(until=fx.Time(1.0)))
-    vector = scene.model.displacement()
+    vector = scene.solver.displacement()
     u = gathered_vector(vector).reshape(-1, mesh.gdim)
     vector.destroy()
     n = scene.continuum.n_local // mesh.gdim
@@ -136,7 +136,7 @@ def test_compression_through_contact(comm: MPI.Intracomm, cell: str) -> None:
         bonds=[nothing],
     )
     history = scene.run(fx.Static(until=fx.Time(1.0)))
-    model = scene.model
+    model = scene.solver
     normal = model.index[0][:, 0]
     pressure = model.system.forces(model.state, normal) / scene.pairs[0].surface.areas
     # both blocks shortened by 0.05: E 0.05, over the width of 2
@@ -163,8 +163,8 @@ def test_pulled_apart_nothing_is_carried(comm: MPI.Intracomm) -> None:
         bonds=[nothing],
     )  # fmt: skip
     history = scene.run(fx.Static(until=fx.Time(1.0)))
-    normal = scene.model.index[0][:, 0]
-    assert scene.model.state.jump[normal] == pytest.approx(np.full(len(normal), 0.1), rel=1e-10)
+    normal = scene.solver.index[0][:, 0]
+    assert scene.solver.state.jump[normal] == pytest.approx(np.full(len(normal), 0.1), rel=1e-10)
     # nothing but round-off of E times 0.1
     assert abs(history.rows[-1]["R[top.y]"]) < 1e-10 * E * 0.1
     scene.close()

@@ -14,8 +14,8 @@ from mpi4py import MPI
 from specimens import tensor_surface
 
 import fxcrack as fx
-from fxcrack.continuum import Continuum
-from fxcrack.errors import InterfaceError
+from fxcrack.base.errors import InterfaceError
+from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.pairing import local_frames
 from fxcrack.interface.surface import gather_surface
 from fxcrack.mesh import Mesh

@@ -9,8 +9,7 @@ from specimens import CLAMPED_3D, specimen
 
 import fxcrack as fx
 from fxcrack.demos import front3d
-from fxcrack.interface.tip import Tips
-from fxcrack.interface.units import edge_midsides, units_of
+from fxcrack.interface.tips import Tips, edge_midsides, units_of
 from fxcrack.meshes.dcb import dcb_3d
 
 
@@ -59,7 +58,9 @@ def test_first_order_tips_are_units_of_their_own():
 def test_wide_second_order_front_softens_edge_by_edge():
     # Elements longer than an arm is thick: let go one by one, rows carried up to twice the load,
     # as G of the row at the free edge is negative.
-    scene, interface = front3d.make_scene(30.0, fx.Progressive(), dx=2.0, dy=5.0, ny=1, order=2)
+    scene, interface = front3d.make_scene(
+        30.0, fx.ProgressiveRelease(), dx=2.0, dy=5.0, ny=1, order=2
+    )
     history = scene.run(fx.Static(until=fx.CrackLength(interface, 40.0)))
     opening, load = front3d.curve(history)
     # mean load over beam theory at the same opening, both taken over the opening: 1.5 % asked for
@@ -71,7 +72,7 @@ def test_wide_second_order_front_softens_edge_by_edge():
     of_theory = load[8:] / front3d.BEAM.dcb_load_at_opening(opening[8:], front3d.G_IC)
     assert 0.96 < of_theory.min() and of_theory.max() < 1.04
     # bonds that are free have spent what their area asks for, no more and no less
-    system, front = scene.model.system, scene.model.fronts[0]
+    system, front = scene.solver.system, scene.solver.fronts[0]
     free = ~front.bonded & (front.surface.x[:, 0] > 30.0 - 1e-9)
     for soft in system.soft.bonds:
         free[soft.where[1]] = False
@@ -99,7 +100,7 @@ def bowed():
         mesh,
         interface=interface,
         criterion=fx.VCCT(GIc=front3d.G_IC),
-        release=fx.Progressive(),
+        release=fx.ProgressiveRelease(),
         supports=CLAMPED_3D,
     )
     return scene, interface
@@ -108,7 +109,7 @@ def bowed():
 def test_no_node_stays_behind_a_bowed_second_order_front():
     # one facet at a step says the front runs sideways; with that heading a node was never a tip
     scene, _ = bowed()
-    front = scene.model.fronts[0]
+    front = scene.solver.fronts[0]
     for _ in range(12):
         tips = front.tips()
         front.release(np.unique(tips.force_nodes))

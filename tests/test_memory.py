@@ -57,7 +57,7 @@ def test_releases_and_new_windows_leave_nothing_behind(
     objects, memory, rebases = [], [], []
     for count in range(20, 221, 20):
         scene.run(fx.Static(until=fx.Releases(count)))
-        scene.model.displacement().destroy()
+        scene.solver.displacement().destroy()
         objects.append(alive(comm, shared_path))
         memory.append(resident_mb())
         rebases.append(scene.history.details["factorizations"])
@@ -90,7 +90,7 @@ def test_scenes_leave_nothing_behind(comm: MPI.Intracomm, shared_path: Path, clo
     for method in ("schur", "columns") * 5:
         scene = dcb(comm, dx=2.0, ny=1, options=fx.CondensedOptions(method=method))
         scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 34.0)))
-        scene.model.displacement().destroy()
+        scene.solver.displacement().destroy()
         if closed:
             scene.close()
         del scene

@@ -13,7 +13,7 @@ import pytest
 from mpi4py import MPI
 from test_mesh_read import ROUND_OFF, assert_same_on_ghosts, corners, measure, size
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Mesh, read_mesh
 from fxcrack.meshes.center_crack import center_crack
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import basix
 import dolfinx.la
 import dolfinx.mesh
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Group, Mesh, mesh_from_domain, mesh_from_gmsh, read_mesh
 from fxcrack.mesh.raw import reference
 from fxcrack.mesh.read import gmsh_model
@@ -280,7 +280,7 @@ PRISM = [0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1]
 FAULTS: list[tuple[str, Callable[[Any], None]]] = [
     (
         "no triangles, quadrilaterals.*mesh the model",
-        lambda g: g.model.occ.addBox(0, 0, 0, 1, 1, 1),
+        lambda g: g.solver.occ.addBox(0, 0, 0, 1, 1, 1),
     ),
     ("2 kinds.*triangle.*recombine", mixed),
     ("without centre nodes.*SecondOrderIncomplete", lambda g: discrete(g, 16, [QUAD8])),

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from fxcrack.base.errors import InputError
 from fxcrack.criteria import BK, MixedMode, Power, Reeder, clip, total
-from fxcrack.errors import InputError
 
 Array = npt.NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from specimens import (
 )
 
 import fxcrack as fx
+from fxcrack.base.errors import ConvergenceError
 from fxcrack.effects import FiniteStrain
-from fxcrack.errors import ConvergenceError
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.meshes.enf import enf_2d
 
@@ -54,7 +54,7 @@ def test_linear_bodies_with_bonds_that_soften(comm: MPI.Intracomm) -> None:
             materials=STEEL,
             model=fx.PlaneStrain(),
             supports=PINS,
-            debonds=[fx.Debond(interface, fx.VCCT(GIc=0.2), release=fx.Progressive())],
+            debonds=[fx.Debond(interface, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())],
             path=path,
         )
         return scene.run(fx.Static(until=fx.CrackLength(interface, 36.0)))
@@ -92,7 +92,7 @@ def test_large_rotation_balances_its_energy(comm: MPI.Intracomm) -> None:
     # the cubic through both ends of a move of 1 leaves about 1e-6 of the work, asked for are 1e-4
     assert largest_imbalance(history) < 1e-5
     assert np.abs(history["balance"]).max() > 0.0
-    assert scene.model.counts.iterations > scene.model.counts.solves  # type: ignore[attr-defined]
+    assert scene.solver.counts.iterations > scene.solver.counts.solves  # type: ignore[attr-defined]
 
 
 def test_a_load_beyond_reach_ends_the_step_with_the_reason(comm: MPI.Intracomm) -> None:
@@ -118,8 +118,8 @@ def test_a_load_beyond_reach_ends_the_step_with_the_reason(comm: MPI.Intracomm) 
     assert "nonlinear solve" in history.reason or "unstable" in history.reason
     assert history["time"][-1] < 150.0
     with pytest.raises(ConvergenceError):
-        scene.model.move(  # type: ignore[attr-defined]
-            scene.loads_at(150.0), np.zeros(scene.model.system.n_window), 150.0, 1.0
+        scene.solver.move(  # type: ignore[attr-defined]
+            scene.loads_at(150.0), np.zeros(scene.solver.system.n_retained), 150.0, 1.0
         )
 
 

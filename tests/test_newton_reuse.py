@@ -20,10 +20,11 @@ from specimens import (
 )
 
 import fxcrack as fx
+from fxcrack.base.errors import ConvergenceError
+from fxcrack.base.timings import Timings
+from fxcrack.condensation.direct import DirectCondensation
 from fxcrack.effects import FiniteStrain
-from fxcrack.errors import ConvergenceError
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.solve.condensation import Condensation, Timings
 
 SAME = 1e-7  # f = 1 is met to 1e-9, the residual to 1e-10 of the forces; slender arms amplify that
 
@@ -51,21 +52,23 @@ def test_same_history_with_fewer_tangents(comm: MPI.Intracomm) -> None:
     # both integrals along the way are those of cubics; how many moves there are differs
     assert one["external_work"][-1] == pytest.approx(other["external_work"][-1], rel=1e-5)
     assert max(map(largest_imbalance, (one, other))) < 1e-5
-    made = [s.model.timings.factorizations for s in scenes]
+    made = [s.solver.timings.factorizations for s in scenes]
     assert made[0] < 0.8 * made[1], made
 
 
 @pytest.mark.parametrize(
     ("stepping", "release"),
     [
-        ("event", fx.Step()),
-        ("increment", fx.Step()),
-        ("path", fx.Step()),
-        ("event", fx.Progressive()),
-        ("increment", fx.Progressive()),
+        ("event", fx.StepRelease()),
+        ("increment", fx.StepRelease()),
+        ("path", fx.StepRelease()),
+        ("event", fx.ProgressiveRelease()),
+        ("increment", fx.ProgressiveRelease()),
     ],
 )
-def test_same_history_with_every_stepping(stepping: str, release: fx.Step | fx.Progressive) -> None:
+def test_same_history_with_every_stepping(
+    stepping: str, release: fx.StepRelease | fx.ProgressiveRelease
+) -> None:
     controls: dict[str, Any] = {"stepping": stepping, "maximum": 0.5}
     if stepping == "increment":
         controls |= {"initial": 0.25, "max_cutbacks": 30}
@@ -98,20 +101,20 @@ def test_rates_by_exact_closure_are_those_of_the_state() -> None:
 def test_a_trial_that_is_forgotten_leaves_the_tangent_as_it_was(comm: MPI.Intracomm) -> None:
     scene = peel(comm, reuse=True)
     scene.run(fx.Static(until=fx.Time(1.0), maximum=1.0))
-    model: Any = scene.model
+    model: Any = scene.solver
     before, made = model.system.schur.copy(), model.timings.factorizations
     saved, u = model.system.snapshot(), gathered_vector(model.u)
     model.move(scene.loads_at(2.0), model.state.force, 2.0, 1.0)
     assert model.timings.factorizations > made
     assert np.abs(model.system.schur - before).max() > 1e-6 * np.abs(before).max()
     made = model.timings.factorizations
-    model.reject(saved)
+    model.revert(saved)
     assert model.timings.factorizations == made  # nothing is factored for it
     assert np.array_equal(model.system.schur, before)
     assert np.array_equal(gathered_vector(model.u), u)
     # and it serves: the same trial again gives the same end
     first = model.move(scene.loads_at(2.0), model.state.force, 2.0, 1.0)
-    model.reject(model.system.snapshot())
+    model.revert(model.system.snapshot())
     again = model.move(scene.loads_at(2.0), model.state.force, 2.0, 1.0)
     size = np.abs(first.jump).max()  # sums of several ranks come in any order
     assert np.abs(first.jump - again.jump).max() < 1e-12 * size
@@ -121,18 +124,18 @@ def test_a_trial_that_is_forgotten_leaves_the_tangent_as_it_was(comm: MPI.Intrac
 def test_a_tangent_that_cannot_be_factored_leaves_a_model_that_can_go_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    from fxcrack.errors import SolverError
+    from fxcrack.base.errors import SolverError
 
     scene = peel(MPI.COMM_SELF, reuse=True)
     scene.run(fx.Static(until=fx.Time(1.0), maximum=1.0))
-    model: Any = scene.model
+    model: Any = scene.solver
     state, loads = model.state, scene.loads_at(2.0)
 
     def fail(self: Any, stiffness: Any) -> None:
         raise SolverError("MUMPS ran out of memory, by design")
 
     with monkeypatch.context() as patch:
-        patch.setattr(Condensation, "renew", fail)
+        patch.setattr(DirectCondensation, "renew", fail)
         with pytest.raises(ConvergenceError, match="ran out of memory, by design"):
             model.move(loads, state.force, 2.0, 1.0)
     assert model.state is state
@@ -155,15 +158,17 @@ def test_condensing_again_is_condensing_anew(
         }
     scene = specimen(dcb_2d(comm, length=20.0, dx=1.0, ny=2), a0=8.0, supports=PINS, **more)
     scene.run(fx.Static(until=fx.Releases(1)))
-    model: Any = scene.model
+    model: Any = scene.solver
     stiffness, coordinates = model._stiffness, model._condensation.coordinates
     poor = stiffness.copy()
     poor.shift(0.1 * float(stiffness.norm()))  # any other one that is definite
     options = {"method": method, "definite": False}
-    twice = Condensation(poor, coordinates, model._borders, Timings(), renewable=True, **options)
+    twice = DirectCondensation(
+        poor, coordinates, model._borders, Timings(), renewable=True, **options
+    )
     first = twice.schur.copy()
     twice.renew(stiffness)
-    anew = Condensation(stiffness, coordinates, model._borders, Timings(), **options)
+    anew = DirectCondensation(stiffness, coordinates, model._borders, Timings(), **options)
     size = np.abs(anew.schur).max()
     assert np.abs(first - anew.schur).max() > 1e-3 * size
     assert np.abs(twice.schur - anew.schur).max() < 1e-10 * size
@@ -201,7 +206,7 @@ def test_whole_steps_bend_a_slender_strip(reuse: bool) -> None:
     )
     history = scene.run(fx.Static(until=fx.Time(1.0)))
     assert history["m[end]"][-1] == pytest.approx(0.7138 * length, rel=0.01)
-    counts = scene.model.counts
+    counts = scene.solver.counts
     assert counts.failures == 0
     assert counts.iterations < 40
 

@@ -10,10 +10,10 @@ from mpi4py import MPI
 from specimens import HELD_FAR, dcb, onsets, specimen
 
 import fxcrack as fx
+from fxcrack.base.errors import ConvergenceError
 from fxcrack.effects import FiniteStrain
-from fxcrack.errors import ConvergenceError
+from fxcrack.history import Row
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.output.history import Row
 
 
 def inflated(maximum: float) -> tuple[fx.Scene, Row]:
@@ -38,7 +38,7 @@ def inflated(maximum: float) -> tuple[fx.Scene, Row]:
 def test_follower_pressure_in_one_increment_or_in_many() -> None:
     """The first whole step alone knows of the new pressure; a failed trial leaves none behind."""
     (one, coarse), (_, fine) = inflated(1.0), inflated(0.05)
-    assert one.model.counts.failures <= 1
+    assert one.solver.counts.failures <= 1
     for name in ("GI[bond]", "strain_energy"):
         assert coarse[name] == pytest.approx(fine[name], rel=1e-6)
     # rounding of the forces that stretch arms 100 times as long as thick is 1e-6 of the pressure
@@ -49,7 +49,7 @@ def test_no_equilibrium_between_here_and_beyond(monkeypatch: pytest.MonkeyPatch)
     """Where the way to f = 1 guessed from a state beyond it has no equilibrium, it is cut."""
     material = fx.Plastic(70e3, 0.3, yield_stress=300.0)
     scene = dcb(MPI.COMM_SELF, dx=2.0, ny=2, materials=material)
-    move, calls = type(scene.model).move, []
+    move, calls = type(scene.solver).move, []
 
     def stubborn(model: Any, loads: Any, force: Any, at: float, dt: float, **more: Any) -> Any:
         calls.append(dt)
@@ -58,7 +58,7 @@ def test_no_equilibrium_between_here_and_beyond(monkeypatch: pytest.MonkeyPatch)
             raise ConvergenceError("for the test")
         return move(model, loads, force, at, dt, **more)
 
-    monkeypatch.setattr(type(scene.model), "move", stubborn)
+    monkeypatch.setattr(type(scene.solver), "move", stubborn)
     history = scene.run(fx.Static(until=fx.Releases(1), maximum=50.0))
     assert history.reason == "1 nodes released"
     assert onsets(history)[0]["f[bond]"] == pytest.approx(1.0, abs=1e-8)
@@ -84,4 +84,4 @@ def test_a_turn_without_stress_is_not_divided() -> None:
         dcb_2d(length=40.0, dx=2.0, ny=2), a0=20.0, supports=supports, effects=[FiniteStrain()]
     )
     assert scene.run(fx.Static(until=fx.Time(1.0))).reason == "time 1 reached"
-    assert scene.model.counts.solves == len(clock)
+    assert scene.solver.counts.solves == len(clock)

@@ -10,7 +10,7 @@ from mpi4py import MPI
 from specimens import FORCES, HELD_FAR, STEEL, assert_same, bond, column, largest_imbalance, onsets
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.demos.enf import ARMS, BEAM, G_IIC
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.meshes.enf import enf_2d
@@ -24,7 +24,9 @@ MOUTH = {"stepping": "opening", "opening": ("pin_top", "pin_bottom")}
 
 def short_dcb(comm: MPI.Intracomm, release: Any = None, gic: float = GIC, **scene: Any) -> fx.Scene:
     """A double cantilever beam under forces, held at its far end."""
-    debond = fx.Debond(bond(10.0, **scene.pop("faces", {})), fx.VCCT(GIc=gic), release or fx.Step())
+    debond = fx.Debond(
+        bond(10.0, **scene.pop("faces", {})), fx.VCCT(GIc=gic), release or fx.StepRelease()
+    )
     parts: dict[str, Any] = {"loads": FORCES, "monitors": PINS} | scene
     return fx.Scene(
         dcb_2d(comm, length=30.0, dx=0.5, ny=2, order=2),
@@ -145,7 +147,7 @@ def test_a_controlled_deflection_is_a_prescribed_one() -> None:
     [
         ({}, {"opening": "pin_topp"}, "did you mean 'pin_top'"),
         ({}, {"opening": "pin_bottom"}, "in its positive direction"),
-        ({"release": fx.Progressive()}, {}, "lets go progressively"),
+        ({"release": fx.ProgressiveRelease()}, {}, "lets go progressively"),
         ({"faces": {"contact": True, "friction": 0.2}}, {}, "leave friction out"),
     ],
 )

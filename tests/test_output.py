@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fxcrack import compat
+from fxcrack.base import compat
+from fxcrack.base.parallel import all_or_none
 from fxcrack.mesh import mesh_from_domain
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.output import fields
-from fxcrack.output.collective import together
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.interface_fields import interface_fields
 
@@ -109,7 +109,7 @@ def read_bodies(pvd: Path) -> list[tuple[float, list[dict[str, Any]]]]:
 @pytest.mark.parametrize("kind", MESHES)
 def test_jumps_and_tractions_agree_with_the_window(kind: str) -> None:
     scene = cracked(kind)
-    model, pair = scene.model, scene.pairs[0]
+    model, pair = scene.solver, scene.pairs[0]
     (found,) = interface_fields(scene, displacement_function(scene))
     inside = (model.index[0] >= 0).all(axis=1)
     assert inside.sum() > 3
@@ -117,7 +117,7 @@ def test_jumps_and_tractions_agree_with_the_window(kind: str) -> None:
     jump = model.vectors(0, nodes, model.state.jump)
     largest = np.abs(found.opening).max()
     np.testing.assert_allclose(found.opening[inside], jump[inside], atol=ROUND_OFF * largest)
-    force = -model.system.forces(model.state, np.arange(model.system.n_window))
+    force = -model.system.forces(model.state, np.arange(model.system.n_retained))
     traction = model.vectors(0, nodes, force) / pair.surface.areas[:, None]
     largest = np.abs(found.traction).max()
     np.testing.assert_allclose(found.traction[inside], traction[inside], atol=ROUND_OFF * largest)
@@ -142,7 +142,7 @@ def test_state_front_and_rates_at_the_nodes() -> None:
         assert found.at_front[name][front] == pytest.approx(row[f"{name}[bond]"], abs=1e-12)
         assert not found.at_front[name][~front].any()
     assert found.at_front["G"][front] == pytest.approx(row["GI[bond]"] + row["GII[bond]"])
-    times = [t for _, t in scene.growths[0].released]
+    times = [t for _, t in scene.cracks[0].released]
     order = np.argsort(x)
     assert not found.release_time[order][:8].any()
     np.testing.assert_array_equal(found.release_time[order][8:11], times)
@@ -154,14 +154,14 @@ def test_state_front_and_rates_at_the_nodes() -> None:
 
 @pytest.mark.mpi
 def test_bonds_that_let_go_still_pull() -> None:
-    scene = cracked(release=fx.Progressive())
+    scene = cracked(release=fx.ProgressiveRelease())
     (found,) = interface_fields(scene, displacement_function(scene))
-    letting_go = found.state == 0.5
-    assert letting_go.any()
-    nodes = {k for bond in scene.model.system.soft.bonds for k in bond.where[1].tolist()}
-    np.testing.assert_array_equal(np.flatnonzero(letting_go), sorted(nodes))
-    assert (np.einsum("nc,nc->n", found.traction, found.normal)[letting_go] > 0.0).all()
-    assert not found.front[letting_go].any()
+    force_ramps = found.state == 0.5
+    assert force_ramps.any()
+    nodes = {k for bond in scene.solver.system.soft.bonds for k in bond.where[1].tolist()}
+    np.testing.assert_array_equal(np.flatnonzero(force_ramps), sorted(nodes))
+    assert (np.einsum("nc,nc->n", found.traction, found.normal)[force_ramps] > 0.0).all()
+    assert not found.front[force_ramps].any()
     total = (found.traction * scene.pairs[0].surface.areas[:, None]).sum(axis=0)
     assert total[1] == pytest.approx(scene.history.rows[-1]["R[pin_top.y]"], rel=1e-8)
     scene.close()
@@ -414,12 +414,12 @@ def test_a_failed_write_leaves_the_old_files(
 @pytest.mark.mpi
 def test_all_ranks_fail_together(comm: MPI.Comm) -> None:
     with pytest.raises(fx.FxcrackError, match=r"counting: KeyError") as caught:
-        with together(comm, "counting"):
+        with all_or_none(comm, "counting"):
             if comm.rank == comm.size - 1:
                 raise KeyError("three")
     mine = isinstance(caught.value.__cause__, KeyError)
     assert mine == (comm.rank == comm.size - 1)
-    with together(comm, "counting"):
+    with all_or_none(comm, "counting"):
         pass
 
 

@@ -8,8 +8,8 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.output.deformed import shape
 from fxcrack.output.fields import displacement_function, stress_function
+from fxcrack.output.plots.deformed import shape
 
 pytestmark = pytest.mark.mpi
 

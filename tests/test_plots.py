@@ -16,10 +16,10 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
-from fxcrack.output import figure as looks
-from fxcrack.output import plots
-from fxcrack.output.advance import release_map
-from fxcrack.output.deformed import Shape, automatic_scale, shape, view_axes
+from fxcrack.output.plots import curves as plots
+from fxcrack.output.plots import style as looks
+from fxcrack.output.plots.deformed import Shape, automatic_scale, shape, view_axes
+from fxcrack.output.plots.front_advance import release_map
 
 STEEL = fx.Isotropic(E=70e3, nu=0.3)
 
@@ -194,7 +194,7 @@ def test_release_map_has_the_crack_area_of_the_history(cell: str, order: int) ->
     # straight fronts: it ends with a row complete
     row = scene.history.rows[-1]
     assert areas[np.isfinite(opened)].sum() == pytest.approx(row["area[bond]"])
-    assert len(data.times) == scene.growths[0].n_released + 1
+    assert len(data.times) == scene.cracks[0].n_released + 1
     assert np.all(np.diff(data.times) >= 0.0)
     with pytest.raises(fx.InputError, match="no interface 'glue'; known: bond"):
         release_map(scene, "glue")

@@ -7,7 +7,7 @@ import pytest
 from specimens import interface_of, specimen
 
 import fxcrack as fx
-from fxcrack.criteria import Ramp
+from fxcrack.criteria import RampRelease
 from fxcrack.demos import enhanced_dcb, front3d
 from fxcrack.meshes.dcb import dcb_2d
 
@@ -46,7 +46,7 @@ def onsets(history):
 
 @pytest.mark.mpi
 def test_progressive_release_dissipates_the_toughness(comm):
-    scene, bond = beam(fx.Progressive())
+    scene, bond = beam(fx.ProgressiveRelease())
     history = scene.run(fx.Static(until=fx.CrackLength(bond, 40.0)))
     for row in onsets(history)[1:]:
         # the law's area under the curve is G_c dA by construction; only round-off remains
@@ -59,15 +59,15 @@ def test_progressive_release_dissipates_the_toughness(comm):
 def test_second_order_units_spend_the_toughness_of_their_area(element):
     # the bond at the midside node ahead is pressed here: its force falls with that of the corner
     mesh = dcb_2d(length=80.0, dx=element, ny=2, order=2)
-    scene = specimen(mesh, a0=20.0, release=fx.Progressive())
+    scene = specimen(mesh, a0=20.0, release=fx.ProgressiveRelease())
     history = scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 20.0 + 6.0 * element)))
     rows = onsets(history)
     assert len(rows) == 6
-    assert min(r.CRSTS[0] for r in scene.growths[0].records) < 0.0
+    assert min(r.CRSTS[0] for r in scene.cracks[0].records) < 0.0
     # the bond that softened at the onset before is free: exact by construction
     exact = [TOUGHNESS * (r["a[bond]"] - 20.0) for r in rows[1:]]
     assert [r["released_energy"] for r in rows[1:]] == pytest.approx(exact, rel=1e-9)
-    assert scene.model.soft_counts.snaps == 0
+    assert scene.solver.soft_counts.snaps == 0
     assert abs(history["balance"]).max() <= 1e-9 * history["external_work"].max()
     # no saw-tooth: little but the softening itself lies between onset and onset
     loads = np.array([r["R[pin_top.y]"] for r in history if r["event"] == "release"])
@@ -77,7 +77,7 @@ def test_second_order_units_spend_the_toughness_of_their_area(element):
 
 def test_saw_tooth_is_at_least_five_times_smaller_than_that_of_step_release():
     amplitude = {}
-    for name, release in (("step", fx.Step()), ("progressive", fx.Progressive())):
+    for name, release in (("step", fx.StepRelease()), ("progressive", fx.ProgressiveRelease())):
         # increments far below the spacing of releases sample the path between them
         scene, bond = beam(release)
         step = fx.Static(
@@ -101,10 +101,10 @@ def test_saw_tooth_is_at_least_five_times_smaller_than_that_of_step_release():
 def test_rebases_while_bonds_soften_change_nothing(comm):
     histories, solves = [], []
     for rows in (None, 2.0):
-        scene, bond = beam(fx.Progressive(), rows=rows)
+        scene, bond = beam(fx.ProgressiveRelease(), rows=rows)
         histories.append(scene.run(fx.Static(until=fx.CrackLength(bond, 38.0))))
-        factorizations = scene.model.timings.factorizations
-        solves.append(scene.model.soft_counts.solves)
+        factorizations = scene.solver.timings.factorizations
+        solves.append(scene.solver.soft_counts.solves)
         scene.close()
     assert factorizations > 2  # the short window did make it factor again
     assert solves[1] >= solves[0] > 0  # counted through all of them
@@ -125,8 +125,8 @@ def test_enhanced_vcct_dissipates_the_propagation_toughness(comm, propagation):
 
 
 def test_enhanced_vcct_with_equal_toughness_is_progressive_vcct():
-    one, bond = beam(fx.Step(), fx.EnhancedVCCT(GIc=TOUGHNESS, GIc_p=TOUGHNESS))
-    other, same = beam(fx.Progressive())
+    one, bond = beam(fx.StepRelease(), fx.EnhancedVCCT(GIc=TOUGHNESS, GIc_p=TOUGHNESS))
+    other, same = beam(fx.ProgressiveRelease())
     a = one.run(fx.Static(until=fx.CrackLength(bond, 36.0)))
     b = other.run(fx.Static(until=fx.CrackLength(same, 36.0)))
     np.testing.assert_allclose(a["R[pin_top.y]"], b["R[pin_top.y]"], rtol=1e-12)
@@ -135,7 +135,7 @@ def test_enhanced_vcct_with_equal_toughness_is_progressive_vcct():
 @pytest.mark.parametrize("order", [1, 2])
 def test_softening_from_exact_closure_is_step_release_and_says_so(order, caplog):
     histories = []
-    for release in (fx.Step(), fx.Progressive()):
+    for release in (fx.StepRelease(), fx.ProgressiveRelease()):
         caplog.clear()
         mesh = dcb_2d(length=60.0, dx=1.0, ny=2, order=order)
         criterion = fx.VCCT(GIc=TOUGHNESS, method="closure")
@@ -155,30 +155,30 @@ def test_softening_from_exact_closure_is_step_release_and_says_so(order, caplog)
 
 
 def test_softening_bond_unloads_along_its_secant_and_loads_again():
-    scene, _ = beam(fx.Progressive())
+    scene, _ = beam(fx.ProgressiveRelease())
     scene.run(fx.Static(until=fx.Releases(1)))
-    system = scene.model.system
+    system = scene.solver.system
     top = scene.time
-    half = scene.model.state
+    half = scene.solver.state
     # a little further, the bond is half open
-    for _, point in system.pieces(half, scene.loads_at(1.01 * top), np.zeros(system.n_window)):
+    for _, point in system.pieces(half, scene.loads_at(1.01 * top), np.zeros(system.n_retained)):
         half = point
     (soft,) = system.soft.bonds
     w, force = soft.opening(half.jump), soft.force(soft.opening(half.jump))
-    for _, point in system.pieces(half, 0.5 * half.loads, np.zeros(system.n_window)):
+    for _, point in system.pieces(half, 0.5 * half.loads, np.zeros(system.n_retained)):
         back = point
     assert soft.largest == pytest.approx(w, rel=1e-9)
     assert soft.force(soft.opening(back.jump)) == pytest.approx(
         force * soft.opening(back.jump) / w, rel=1e-9
     )
-    for _, point in system.pieces(back, half.loads, np.zeros(system.n_window)):
+    for _, point in system.pieces(back, half.loads, np.zeros(system.n_retained)):
         again = point
     np.testing.assert_allclose(again.jump, half.jump, rtol=1e-7, atol=1e-12 * abs(half.jump).max())
     scene.close()
 
 
 def test_ramp_with_opening_spends_the_closure_energy():
-    scene, bond = beam(Ramp())
+    scene, bond = beam(RampRelease())
     history = scene.run(fx.Static(until=fx.CrackLength(bond, 36.0)))
     last = onsets(history)[-1]
     # at f = 1 the ramp's 1/2 F0 w_c is what crack closure calls G_c dA on an even mesh
@@ -186,7 +186,7 @@ def test_ramp_with_opening_spends_the_closure_energy():
 
 
 def test_ramp_over_increments_needs_increments():
-    scene, bond = beam(Ramp(increments=3))
+    scene, bond = beam(RampRelease(increments=3))
     with pytest.raises(fx.InputError, match="stepping='increment'"):
         scene.run(fx.Static(until=fx.CrackLength(bond, 36.0)))
     history = scene.run(
@@ -202,7 +202,7 @@ def test_ramp_over_increments_needs_increments():
 def test_viscosity_spends_energy_and_fades_with_small_increments():
     spent = {}
     for viscosity in (0.0, 1e-3, 1e-2):
-        scene, bond = beam(fx.Step(), fx.VCCT(GIc=TOUGHNESS, viscosity=viscosity))
+        scene, bond = beam(fx.StepRelease(), fx.VCCT(GIc=TOUGHNESS, viscosity=viscosity))
         step = fx.Static(
             until=fx.CrackLength(bond, 34.0),
             stepping="increment",
@@ -229,7 +229,7 @@ def test_viscosity_of_softening_bonds_fades_with_mu_and_the_increment(kind):
         criterion = (
             fx.EnhancedVCCT(**rates, GIc_p=propagation) if kind == "enhanced" else fx.VCCT(**rates)
         )
-        release = fx.Step() if kind == "enhanced" else fx.Progressive()
+        release = fx.StepRelease() if kind == "enhanced" else fx.ProgressiveRelease()
         scene, bond = beam(release, criterion)
         end = fx.CrackLength(bond, 32.0)
         step = {"stepping": "increment", "initial": size, "maximum": size, "max_cutbacks": 40}
@@ -258,13 +258,13 @@ def test_viscosity_of_softening_bonds_fades_with_mu_and_the_increment(kind):
 
 
 def test_viscosity_and_a_ramp_over_increments_do_not_go_together():
-    scene, bond = beam(Ramp(increments=3), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
+    scene, bond = beam(RampRelease(increments=3), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
     with pytest.raises(fx.InputError, match="viscosity delays a release at once or with the open"):
         scene.run(fx.Static(until=fx.CrackLength(bond, 34.0), stepping="increment"))
 
 
 def test_viscosity_needs_increments():
-    scene, bond = beam(fx.Step(), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
+    scene, bond = beam(fx.StepRelease(), fx.VCCT(GIc=TOUGHNESS, viscosity=1e-3))
     with pytest.raises(fx.InputError, match="viscosity acts over increments"):
         scene.run(fx.Static(until=fx.CrackLength(bond, 34.0)))
 
@@ -272,7 +272,7 @@ def test_viscosity_needs_increments():
 def test_linear_scaling_heads_for_the_first_release():
     counts = {}
     for beta in (None, 0.9):
-        scene, _ = beam(fx.Step())
+        scene, _ = beam(fx.StepRelease())
         step = fx.Static(
             until=fx.Releases(1),
             stepping="increment",
@@ -289,9 +289,9 @@ def test_linear_scaling_heads_for_the_first_release():
 
 
 def test_records_of_released_bonds_carry_the_usual_names(tmp_path):
-    scene, _ = beam(fx.Step())
+    scene, _ = beam(fx.StepRelease())
     scene.run(fx.Static(until=fx.Releases(3)))
-    records = scene.growths[0].records
+    records = scene.cracks[0].records
     assert [r.node for r in records] == sorted(r.node for r in records)
     for record in records:
         # event stepping releases at f = 1 to round-off
@@ -311,7 +311,7 @@ def test_toughness_follows_the_temperature():
     hot = fx.Tabulated((0.0, 100.0), (0.2, 0.1))
     loads = []
     for temperature in (0.0, 100.0):
-        scene, _ = beam(fx.Step())
+        scene, _ = beam(fx.StepRelease())
         debond = fx.Debond(scene.debonds[0].interface, fx.VCCT(GIc=hot), temperature=temperature)
         other = fx.Scene(
             scene.mesh,
@@ -330,9 +330,9 @@ def test_toughness_follows_the_temperature():
 
 @pytest.mark.slow
 def test_front_in_3d_keeps_its_energy_only_with_progressive_release():
-    step, found = front3d.run(fx.Step(), until=50.0)
+    step, found = front3d.run(fx.StepRelease(), until=50.0)
     step.close()
-    gradual, right = front3d.run(fx.Progressive(), until=50.0)
+    gradual, right = front3d.run(fx.ProgressiveRelease(), until=50.0)
     gradual.close()
     # design.md section 12: step release carries 11 to 15 % less and spends 0.108 to 0.16
     assert 0.84 < found["load / theory"] < 0.90

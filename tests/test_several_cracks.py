@@ -37,7 +37,7 @@ def test_tips_meet_and_the_crack_runs_out_of_its_surface(name: str, order: int) 
     scene = plate(CRITERIA[name], bonded=outside_two_cracks, order=order)
     history = run(scene, fx.Releases(1000))
     assert history.reason == "no crack tip is left"
-    assert not scene.model.fronts[0].bonded.any()
+    assert not scene.solver.fronts[0].bonded.any()
     assert_balanced(history)
     times = release_times(scene)
     # the ligament from both sides to its middle, then the outer tips to the ends of the surface
@@ -57,7 +57,7 @@ def test_plate_that_comes_apart_under_a_force_ends_in_the_last_equilibrium() -> 
         "total separation: letting the next node go would leave a body held by nothing; "
         "the step ends in the last equilibrium before it"
     )
-    assert scene.model.fronts[0].bonded.sum() in (1, 2)  # the last node, or both ends at once
+    assert scene.solver.fronts[0].bonded.sum() in (1, 2)  # the last node, or both ends at once
     assert np.isfinite(history["strain_energy"]).all()
     assert_balanced(history)
 
@@ -82,7 +82,7 @@ def test_bonds_in_the_normal_direction_only(name: str) -> None:
     for scene in (tied, slips):
         history = run(scene, fx.Releases(6))
         assert_balanced(history)
-        assert scene.growths[0].n_released >= 6
+        assert scene.cracks[0].n_released >= 6
     shear = [h.history["R[top.x]"] / np.maximum(h.history["time"], 1e-300) for h in (tied, slips)]
     assert (shear[0][1:] > 1.0).all()
     # nothing but the opening is transmitted, and the plate has no other hold of its upper half;
@@ -101,7 +101,7 @@ def test_steps_in_sequence_and_pairs_that_stay_tied() -> None:
     first, second = scene.debonds
 
     def released() -> list[int]:
-        return [g.n_released for g in scene.growths]
+        return [g.n_released for g in scene.cracks]
 
     scene.run(fx.Static(until=fx.Time(2.5)), grow=[], progress=False)
     assert released() == [0, 0]
@@ -128,7 +128,7 @@ def test_order_of_steps_does_not_matter_where_nothing_grows() -> None:
     run(at_once, fx.Time(8.0))
     for end in (1.0, 3.0, 5.5, 8.0):
         run(in_parts, fx.Time(end))
-    for g, h in zip(at_once.growths, in_parts.growths, strict=True):
+    for g, h in zip(at_once.cracks, in_parts.cracks, strict=True):
         assert [n for n, _ in g.released] == [n for n, _ in h.released]
         times = [np.array([t for _, t in growth.released]) for growth in (g, h)]
         assert times[1] == pytest.approx(times[0], rel=1e-8)  # other windows, another factor
@@ -150,7 +150,7 @@ def test_two_pairs_with_a_criterion_each() -> None:
     )  # fmt: skip
     history = run(mixed, fx.Time(8.0))
     assert_balanced(history)
-    assert all(g.n_released > 0 for g in mixed.growths)
+    assert all(g.n_released > 0 for g in mixed.cracks)
     for title, quantities in (("first", {"cod", "grown"}), ("second", {"s11", "s12"})):
         columns = {c.split("[")[0] for c in history.columns if c.endswith(f"[{title}]")}
         assert quantities <= columns
@@ -177,14 +177,14 @@ LAW = fx.AmplitudeRelease((0.0, 1e-5, 4e-5), (1.0, 0.75, 0.0))
 
 def remaining(scene: fx.Scene, node: int) -> Any:
     """Bond force of a node in jump components."""
-    index = scene.model.index[0][node]
-    return scene.model.system.forces(scene.model.state, index)
+    index = scene.solver.index[0][node]
+    return scene.solver.system.forces(scene.solver.state, index)
 
 
 def test_force_follows_the_amplitude_through_steps() -> None:
     scene = plate(fx.CriticalStress(100.0, distance=0.3), release=LAW, watch=())
     run(scene, fx.Releases(2))
-    node, start = scene.growths[0].released[0]
+    node, start = scene.cracks[0].released[0]
     whole = remaining(scene, node)
     assert whole[0] < -1.0  # the slave side is held back
     for elapsed in (0.5e-5, 1e-5, 2e-5, 4e-5, 6e-5):
@@ -205,7 +205,7 @@ def test_release_in_progress_survives_steps_and_new_windows(rows: float | None) 
     run(whole, fx.Time(1.25e-3))
     for end in (1.0e-3, 1.1e-3, 1.16e-3, 1.25e-3):
         history = run(parts, fx.Time(end))
-    times = [np.array([t for _, t in s.growths[0].released]) for s in (whole, parts)]
+    times = [np.array([t for _, t in s.cracks[0].released]) for s in (whole, parts)]
     assert len(times[0]) > 30
     assert times[1] == pytest.approx(times[0], rel=ROUND_OFF)
     assert_balanced(history)

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 
-from fxcrack import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
 import dolfinx.mesh
 from test_mesh_read import assert_same_on_ghosts, size
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Split, mesh_from_gmsh, read_mesh
 from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.raw import RawGroup, RawMesh

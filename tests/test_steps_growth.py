@@ -213,8 +213,8 @@ def test_any_window(name: str, options: dict[str, object]) -> None:
     small = make(MPI.COMM_SELF, options=fx.CondensedOptions(**options))
     expected, found = whole.run(step), small.run(step)
     if "rows" in options:
-        assert small.model.rebases >= 1
-        assert found.details["factorizations"] == small.model.rebases + 1
+        assert small.solver.rebases >= 1
+        assert found.details["factorizations"] == small.solver.rebases + 1
         assert found.details["window"] <= expected.details["window"]
     assert_same(expected, found, SAME)
     assert largest_imbalance(found) < BALANCE
@@ -227,10 +227,10 @@ def test_new_windows_on_several_ranks(comm: MPI.Intracomm) -> None:
     alone = dcb(MPI.COMM_SELF, dx=1.0, ny=2, contact=True)
     together = dcb(comm, dx=1.0, ny=2, contact=True, options=small)
     assert_same(grow_to(alone, 42.0), grow_to(together, 42.0), SAME)
-    assert together.model.rebases >= 3
+    assert together.solver.rebases >= 3
     energies = []
     for scene in (alone, together):
-        k, vector = scene.continuum.stiffness(), scene.model.displacement()
+        k, vector = scene.continuum.stiffness(), scene.solver.displacement()
         product = vector.duplicate()
         k.mult(vector, product)
         energies.append(0.5 * vector.dot(product))
@@ -332,7 +332,7 @@ def test_refactoring_at_each_release(nx_lower: int | None) -> None:
     history = scene.run(fx.Static(until=fx.Releases(12)))
     nodes, amplitudes = refactored(scene, 12)
     assert [int(r["node[bond]"]) for r in onsets(history)] == nodes
-    assert [node for node, *_ in scene.growths[0].released] == nodes
+    assert [node for node, *_ in scene.cracks[0].released] == nodes
     # displacement control: the crack never runs unstably, so amplitudes grow
     assert column(onsets(history), "time") == pytest.approx(amplitudes, rel=SAME)
 
@@ -484,10 +484,10 @@ def test_mechanism_needs_no_huge_load() -> None:
 
 def assert_faces_apart(scene: fx.Scene) -> tuple[Array, Array]:
     """Gaps and pressures of the open faces: none negative, none together."""
-    model, state = scene.model, scene.model.state
+    model, state = scene.solver, scene.solver.state
     index = model.index[0][~model.fronts[0].bonded & scene.pairs[0].paired, 0]
     gap = state.jump[index]
-    every = model.system.forces(state, np.arange(model.system.n_window))
+    every = model.system.forces(state, np.arange(model.system.n_retained))
     pressure, scale = every[index], np.abs(every).max()
     assert gap.min() >= -1e-10 * np.abs(gap).max()
     assert pressure.min() >= -1e-10 * scale
@@ -542,7 +542,7 @@ def test_wake_closes_again() -> None:
     # without contact the faces would pass through each other
     through = dcb(MPI.COMM_SELF, dx=1.0, ny=2, **options)
     through.run(fx.Static(until=fx.Time(1.8)))
-    model = through.model
+    model = through.solver
     vector = model.displacement()
     u, pair = vector.array.reshape(-1, 2), through.pairs[0]
     gaps = u[pair.surface.dofs, 1] - u[pair.masters[:, 0], 1]
@@ -581,7 +581,7 @@ def test_closure_is_the_energy_released(name: str) -> None:
     for _ in range(5):
         count = scene.history.rows[-1]["released[bond]"] if scene.history.rows else 0
         first = len(scene.history)
-        tips = scene.model.fronts[0].tips()
+        tips = scene.solver.fronts[0].tips()
         history = scene.run(fx.Static(until=fx.Releases(count + 1)))
         begin, end = (
             next(r for r in history.rows[first:] if r["event"] == event)

@@ -10,9 +10,9 @@ from mpi4py import MPI
 from specimens import PINS, STEEL, bond, dcb, interface_of
 
 import fxcrack as fx
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.steps.increments import IncrementControl, TooManyCutbacks
+from fxcrack.steps.increment_stepping import IncrementControl, TooManyCutbacks
 
 END = fx.Time(1.0)
 

@@ -42,8 +42,8 @@ def test_toughness_follows_the_temperature_of_the_bodies(comm: MPI.Intracomm) ->
     # f = 1 is located to round-off on linear pieces
     assert column(first, "GI[bond]") == pytest.approx(critical, rel=1e-10)
     # the specimen stands still while it warms up: the first onset is where the table says
-    at_rest = first[0]["GI[bond]"]
-    assert first[0]["time"] == pytest.approx(1.0 + (0.2 - at_rest) / 0.15, rel=1e-12)
+    checkpoint_point = first[0]["GI[bond]"]
+    assert first[0]["time"] == pytest.approx(1.0 + (0.2 - checkpoint_point) / 0.15, rel=1e-12)
 
 
 def test_toughness_follows_the_temperature_on_the_nonlinear_path(comm: MPI.Intracomm) -> None:

@@ -86,7 +86,7 @@ def test_threshold_and_upper_limit_of_fatigue_follow_the_local_toughness() -> No
         events = [r["event"] for r in history]
         assert ("unstable" in events) == (value == 0.28)
         assert history.reason.startswith("arrest")
-        assert scene.growths[0].n_released == (2 if value == 0.28 else 0)
+        assert scene.cracks[0].n_released == (2 if value == 0.28 else 0)
 
 
 @pytest.mark.parametrize("kind", ["stress", "opening"])

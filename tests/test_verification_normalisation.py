@@ -14,9 +14,9 @@ from specimens import interface_of, specimen
 
 import fxcrack as fx
 from fxcrack.criteria import closure_rates, energy_release_rates
-from fxcrack.criteria.rate_criterion import NORMALISATIONS
+from fxcrack.criteria.crack_closure import NORMALISATIONS
+from fxcrack.criteria.probe import bond_forces, closure_jumps, openings
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
-from fxcrack.solve.tips import bond_forces, closure_jumps, openings
 
 pytestmark = pytest.mark.verification
 
@@ -30,7 +30,7 @@ def rates(x: Array) -> tuple[Array, dict[str, Array]]:
     mesh = dcb_2d(MPI.COMM_SELF, ny=8, x_spacing=x)
     scene = specimen(mesh, a0=x[x >= FIRST - 1e-9][0])
     scene.run(fx.Static(until=(fx.Releases(1), fx.CrackLength(interface_of(scene), LAST + 1.0))))
-    model, growth = scene.model, scene.growths[0]
+    model, growth = scene.solver, scene.cracks[0]
     lengths: list[float] = []
     found: dict[str, list[float]] = {name: [] for name in (*NORMALISATIONS, "closure")}
     while True:
@@ -49,7 +49,7 @@ def rates(x: Array) -> tuple[Array, dict[str, Array]]:
             found[name].append(scale * g[0, 0])
         jumps = closure_jumps(model, 0, tips, force)
         found["closure"].append(scale * closure_rates(force, jumps, tips.area)[0, 0])
-        model.release(0, tips.node, np.zeros(model.system.n_window))
+        model.release(0, tips.node, np.zeros(model.system.n_retained))
     return np.array(lengths), {name: np.array(g) for name, g in found.items()}
 
 

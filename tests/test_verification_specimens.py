@@ -12,7 +12,7 @@ from mpi4py import MPI
 from specimens import bond, column, dcb3, grow_to, largest_imbalance, onsets, specimen
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.enf import enf_2d
 from fxcrack.meshes.mmb import mmb_2d
@@ -91,7 +91,7 @@ def test_double_cantilever_of_carbon_fibre_in_3d() -> None:
     for a, load in published.items():
         assert loads[a] == pytest.approx(load, rel=0.03)
     # the front from edge to edge: never ahead at the edges, behind by an element there
-    still = scene.model.fronts[0].bonded
+    still = scene.solver.fronts[0].bonded
     across = np.unique(x[:, 2].round(6))
     front = np.array([x[still & np.isclose(x[:, 2], z), 0].min() for z in across])
     assert np.all(front[[0, -1]] < front[4:-4].min() - 0.4)
@@ -111,8 +111,8 @@ def test_second_order_hexahedra() -> None:
         mesh = dcb_3d(MPI.COMM_SELF, length=50.0, width=10.0, dx=dx, dy=dy, ny=ny, order=order)
         scene = specimen(mesh, criterion=fx.VCCT(GIc=0.2))
         scene.run(fx.Static(until=fx.Time(0.1)))
-        growth = scene.growths[0]
-        values = growth.evaluate(growth.tips(), scene.model.state, scene.time)
+        growth = scene.cracks[0]
+        values = growth.evaluate(growth.tips(), scene.solver.state, scene.time)
         g, width = values.report["GI"], values.tips.width
         rates.append(g @ width / width.sum())
         stiffness.append(scene.history.rows[-1]["R[end_upper.y]"])
@@ -128,8 +128,8 @@ def test_energy_release_over_the_width() -> None:
     """bench dcb3d on its coarser mesh: G from edge to middle at the load of the mean."""
     scene = dcb3(MPI.COMM_SELF)
     scene.run(fx.Static(until=fx.Time(1.0)))
-    tips = scene.growths[0].tips()
-    g = scene.growths[0].evaluate(tips, scene.model.state, 1.0).report["GI"]
+    tips = scene.cracks[0].tips()
+    g = scene.cracks[0].evaluate(tips, scene.solver.state, 1.0).report["GI"]
     order = np.argsort(scene.pairs[0].surface.x[tips.node, 2])
     g = g[order]
     width = tips.width[order]

@@ -15,7 +15,6 @@ A scene function takes a :class:`Setting` and returns a :class:`Case`::
 ``Scene.run(..., accuracy=0.01)`` judges a run on a given mesh.
 """
 
-from fxcrack.accuracy.estimate import AccuracyError, Estimate
 from fxcrack.accuracy.knowledge import choose
 from fxcrack.accuracy.study import (
     Case,
@@ -27,6 +26,7 @@ from fxcrack.accuracy.study import (
     critical,
     study,
 )
+from fxcrack.error_estimate import AccuracyError, Estimate
 
 __all__ = [
     "AccuracyError",

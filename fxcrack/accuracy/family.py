@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from fxcrack.accuracy.study import Setting, Study
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
 
 
 def settings(study: Study) -> list[Setting]:

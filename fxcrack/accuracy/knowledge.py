@@ -5,11 +5,11 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from fxcrack.accuracy.estimate import AccuracyError, check_accuracy
 from fxcrack.accuracy.pareto import cheapest, percent
 from fxcrack.accuracy.reference import worst
 from fxcrack.accuracy.study import Setting
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
+from fxcrack.error_estimate import AccuracyError, check_accuracy
 
 
 def choose(path: str | Path, accuracy: float, *, measure: str | None = None) -> Setting:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from fxcrack.base.arrays import Array
+
 Box = tuple[float, float, float, float]
 """Left, bottom, right, top."""
 

@@ -19,10 +19,10 @@ from dataclasses import replace
 from types import TracebackType
 from typing import Any
 
-from fxcrack import processes
 from fxcrack.accuracy.study import Setting
 from fxcrack.accuracy.worker import MARK
-from fxcrack.errors import FxcrackError
+from fxcrack.base import machine as processes
+from fxcrack.base.errors import FxcrackError
 
 _GRACE = 2.0  # seconds between asking a worker to end and ending it
 START_LIMIT = 60.0

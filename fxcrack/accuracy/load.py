@@ -9,7 +9,7 @@ from pathlib import Path
 from types import ModuleType
 
 from fxcrack.accuracy.study import Study
-from fxcrack.errors import FxcrackError, InputError
+from fxcrack.base.errors import FxcrackError, InputError
 
 
 def load(name: str) -> Study:

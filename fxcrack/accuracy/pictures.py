@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 from matplotlib import patheffects
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -20,9 +19,9 @@ from fxcrack.accuracy.fit import FIT_POINTS, FIT_RANGE
 from fxcrack.accuracy.labels import Box, nearest, place
 from fxcrack.accuracy.pareto import TARGETS
 from fxcrack.accuracy.study import Setting
-from fxcrack.output.figure import COLOURS, GREY, INK, LIGHT, new_figure, save
+from fxcrack.base.arrays import Array
+from fxcrack.output.plots.style import COLOURS, GREY, INK, LIGHT, new_figure, save
 
-Array = npt.NDArray[np.float64]
 Result = dict[str, Any]
 
 _SHAPES = (("quadrilateral", "hexahedron"), ("triangle", "tetrahedron"))

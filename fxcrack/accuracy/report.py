@@ -14,7 +14,7 @@ from rich.text import Text
 from fxcrack.accuracy.pareto import duration, percent
 from fxcrack.accuracy.pictures import draw_cost, draw_error
 from fxcrack.accuracy.study import Setting
-from fxcrack.output.atomic import replacing
+from fxcrack.base.files import replacing
 
 Result = dict[str, Any]
 

@@ -24,7 +24,7 @@ from fxcrack.accuracy.pareto import TARGETS, advice, cheapest, pareto_front
 from fxcrack.accuracy.reference import MAIN, Reference, reference, worst
 from fxcrack.accuracy.study import Setting, Study
 from fxcrack.accuracy.worker import REPEATS, SHORT
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
 
 Result = dict[str, Any]
 Tell = Callable[[str], None]

@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
 from fxcrack.accuracy.study import (
     Case,
@@ -22,19 +21,18 @@ from fxcrack.accuracy.study import (
     critical,
     study,
 )
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import unknown_name
+from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
+from fxcrack.continuum.loads import Displacement, Monitor, PointForce, Pressure
+from fxcrack.continuum.materials import Isotropic
 from fxcrack.criteria import VCCT, Fatigue
-from fxcrack.errors import unknown_name
+from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
-from fxcrack.loads import Displacement, Monitor, PointForce, Pressure
-from fxcrack.materials import Isotropic
-from fxcrack.models import Axisymmetric, PlaneStrain, PlaneStress
-from fxcrack.output.history import History
 from fxcrack.scene import Scene
-from fxcrack.steps.fatigue import Cycles
-from fxcrack.steps.growth import Debond
-from fxcrack.steps.until import CrackLength, Releases
-
-Array = npt.NDArray[np.float64]
+from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.end_conditions import CrackLength, Releases
 
 
 def _bond(start: float, *, contact: bool = False) -> Interface:

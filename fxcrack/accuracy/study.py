@@ -13,15 +13,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.errors import InputError
-from fxcrack.output.history import History, Row
+from fxcrack.base.errors import InputError
+from fxcrack.history import History, Row
 
 if TYPE_CHECKING:
+    from fxcrack.condensation.options import CondensedOptions
     from fxcrack.scene import Scene
-    from fxcrack.solve.options import CondensedOptions
-    from fxcrack.steps.fatigue import Cycles
+    from fxcrack.steps.cycles import Cycles
+    from fxcrack.steps.end_conditions import Until
     from fxcrack.steps.static import Static
-    from fxcrack.steps.until import Until
 
 _CELLS = {"quadrilateral": 2, "triangle": 2, "hexahedron": 3, "tetrahedron": 3}
 _SHORT = {"quadrilateral": "quad", "triangle": "tri", "hexahedron": "hex", "tetrahedron": "tet"}
@@ -97,7 +97,7 @@ class Setting:
 
     def options(self) -> CondensedOptions:
         """Options of the scene."""
-        from fxcrack.solve.options import CondensedOptions
+        from fxcrack.condensation.options import CondensedOptions
 
         return CondensedOptions(method=self.solver)
 

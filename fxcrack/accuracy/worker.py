@@ -24,11 +24,11 @@ from typing import Any
 import fxcrack  # isort: skip  (orders MPI before DOLFINx)
 from mpi4py import MPI
 
-from fxcrack.abort import all_arrive
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.study import Setting, Study
+from fxcrack.base.parallel import all_arrive
 from fxcrack.bench.measure import peak_memory, slowest
-from fxcrack.output.history import Row
+from fxcrack.history import Row
 
 MARK = "@fxcrack-accuracy "
 REPEATS = 3

@@ -20,20 +20,17 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.errors import InputError
 from fxcrack.bench.measure import check_mumps, mumps_cholesky
 from fxcrack.bench.problem import Problem
+from fxcrack.condensation.retained import CostModel, choose_roles
 from fxcrack.criteria import RateCriterion, energy_release_rates
-from fxcrack.errors import InputError
-from fxcrack.interface.extent import CrackExtent
+from fxcrack.interface.crack_extent import CrackExtent
 from fxcrack.interface.front import Front
-from fxcrack.interface.jumps import JumpCoordinates, build_coordinates
-from fxcrack.interface.tip import Tips
+from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinates
+from fxcrack.interface.tips import Tips
 from fxcrack.scene import Scene
-from fxcrack.solve.window import CostModel, choose_roles
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
-Ints = npt.NDArray[np.int64]
 
 _TOGETHER = 1.0 - 1e-6  # front nodes this near the largest f go together, as in fxcrack
 _UNLIMITED_MB = 1e6
@@ -44,8 +41,8 @@ class Response:
     """Equilibrium at opening 1.
 
     Attributes:
-        jump: Jumps of the window, shape (n_window,), length.
-        force: Interface forces of the window, shape (n_window,).
+        jump: Jumps of the window, shape (n_retained,), length.
+        force: Interface forces of the window, shape (n_retained,).
         load: Reaction of the upper arm's end, force.
     """
 
@@ -58,7 +55,7 @@ class Solver(Protocol):
     """Finds the equilibrium for given free window components."""
 
     def respond(self, free: Bools) -> Response:
-        """Equilibrium at opening 1 with some window components free, shape (n_window,)."""
+        """Equilibrium at opening 1 with some window components free, shape (n_retained,)."""
         ...
 
 
@@ -89,9 +86,9 @@ class Matrices:
         self.upper, self.lower = problem.load_columns(scene)
 
     @property
-    def n_window(self) -> int:
+    def n_retained(self) -> int:
         """Number of window components."""
-        return self.coordinates.n_window
+        return self.coordinates.n_retained
 
     def last(self, vector: PETSc.Vec) -> Array:
         """The window and support entries of a vector, on every rank; collective."""
@@ -124,7 +121,7 @@ class Refactor:
     def respond(self, free: Bools) -> Response:
         """Equilibrium at opening 1; one numeric factorisation and one back-solve."""
         of, (q, right) = self._of, self._vectors
-        n = of.n_window
+        n = of.n_retained
         of.matrix.copy(self._work, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
         held = np.concatenate([np.flatnonzero(~free), n + np.arange(of.coordinates.n_supports)])
         q.set(0.0)
@@ -209,7 +206,7 @@ class Columns:
 
     def respond(self, free: Bools) -> Response:
         """Equilibrium at opening 1 from the columns of the free components."""
-        n = self._of.n_window
+        n = self._of.n_retained
         ends = n + np.array([self._of.upper, self._of.lower])
         pull = 0.5 * (self.column(int(ends[0])) - self.column(int(ends[1])))
         rows = np.flatnonzero(free)
@@ -271,7 +268,7 @@ class Follower:
         n = pair.surface.n_nodes
         x = pair.surface.x[:, : matrices.gdim]
         self._toughness = self._criterion.toughness_at(x, np.arange(n), n_slave=n)
-        self.free = np.zeros(matrices.n_window, dtype=bool)
+        self.free = np.zeros(matrices.n_retained, dtype=bool)
         self._free(np.flatnonzero(~self.front.bonded))
         self._opening = 0.0
 

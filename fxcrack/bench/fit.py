@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import nnls
 
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
 
 Result = dict[str, Any]
 
@@ -29,7 +29,7 @@ def fit_law(n: list[float], y: list[float], exponent: float, log: float, linear:
 
 
 def constants(result: Result) -> Result:
-    """What :class:`fxcrack.solve.cost.Constants` reads, from :func:`fxcrack.bench.scale.run`.
+    """What :class:`fxcrack.bench.cost.Constants` reads, from :func:`fxcrack.bench.scale.run`.
 
     Raises:
         InputError: Cases that are needed were not measured.

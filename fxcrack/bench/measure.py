@@ -23,14 +23,14 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack
-from fxcrack import processes
+from fxcrack.base import machine as processes
+from fxcrack.base.errors import SolverError
 from fxcrack.bench.problem import LENGTHS, Problem
-from fxcrack.errors import SolverError
-from fxcrack.interface.jumps import HELD, INNER, build_coordinates
+from fxcrack.condensation.mumps_schur import mumps_message, ordering
+from fxcrack.history import History, Row
+from fxcrack.interface.jump_coordinates import FIXED, FREE, build_coordinates
 from fxcrack.mesh import Mesh
-from fxcrack.output.history import History, Row
 from fxcrack.scene import Scene
-from fxcrack.solve.petsc_schur import mumps_message, ordering
 
 _WORKSPACE = 40  # per cent more than MUMPS estimates (ICNTL(14)), as in the condensation
 _CHILD_LIMIT = 1800.0  # seconds
@@ -116,7 +116,7 @@ def grow(problem: Problem, mesh: Mesh) -> tuple[Growth, Scene]:
     beyond = end - history.clock[last]
     seconds = {"scene": made - begin}
     for phase in ("assemble", "transform", "factor_with_schur", "march"):
-        seconds[phase] = scene.model.timings.seconds[phase]
+        seconds[phase] = scene.solver.timings.seconds[phase]
     seconds["march"] -= beyond
     seconds["total"] = end - begin - (compiled - made) - beyond
     seconds = {phase: slowest(comm, value) for phase, value in seconds.items()}
@@ -171,7 +171,7 @@ def solve_once(problem: Problem, mesh: Mesh, *, compare: bool = True) -> dict[st
     clock.append(time.perf_counter())
     (pair,) = scene.pairs
     bonded = np.repeat(pair.bonded[:, None], mesh.gdim, axis=1)
-    role = np.where(bonded, HELD, INNER).astype(np.int8)
+    role = np.where(bonded, FIXED, FREE).astype(np.int8)
     coordinates = build_coordinates(scene.continuum, scene.pairs, [role], scene.supports, 0)
     matrix = stiffness.ptap(coordinates.transform)
     stiffness.destroy()

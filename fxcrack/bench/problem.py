@@ -11,21 +11,21 @@ from dataclasses import dataclass
 
 from mpi4py import MPI
 
-from fxcrack.beams import CorrectedBeam
+from fxcrack.base.errors import InputError
+from fxcrack.beam_theory import CorrectedBeam
+from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.kinematics import PlaneStrain, Solid
+from fxcrack.continuum.loads import Displacement
+from fxcrack.continuum.materials import Isotropic
 from fxcrack.criteria import VCCT
-from fxcrack.errors import InputError
+from fxcrack.history import Row
 from fxcrack.interface.pairing import Interface
-from fxcrack.loads import Displacement
-from fxcrack.materials import Isotropic
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
-from fxcrack.models import PlaneStrain, Solid
-from fxcrack.output.history import Row
 from fxcrack.scene import Scene
-from fxcrack.solve.options import CondensedOptions
-from fxcrack.steps.growth import Debond
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.end_conditions import CrackLength
 from fxcrack.steps.static import Static
-from fxcrack.steps.until import CrackLength
 
 LENGTHS = (30.0, 45.0, 60.0)
 """Crack lengths at which opening and load are reported."""

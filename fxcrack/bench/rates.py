@@ -9,7 +9,7 @@ import numpy as np
 from mpi4py import MPI
 
 from fxcrack.bench.measure import slowest
-from fxcrack.solve.cholesky import GrowingCholesky
+from fxcrack.equilibrium.growing_cholesky import GrowingCholesky
 
 Result = dict[str, Any]
 

@@ -208,7 +208,7 @@ def _by_columns(problem: Problem, growth: Growth, scene: Scene, matrices: Matric
     follower = Follower(matrices, scene, columns)
     events = _follow(comm, follower, min(N_RELEASES, n_events), 0.0)
     needed = matrices.gdim * int(growth.history.rows[growth.last]["released[bond]"])
-    for c in range(matrices.n_window):
+    for c in range(matrices.n_retained):
         each = slowest(comm, columns.column_seconds / columns.n_columns)
         if columns.n_columns >= N_COLUMNS and (needed - columns.n_columns) * each > _PATIENCE:
             break

@@ -23,17 +23,17 @@ import numpy as np
 from mpi4py import MPI
 
 import fxcrack
-from fxcrack import processes
+from fxcrack.base import machine as processes
+from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.base.machine import machine_name
 from fxcrack.bench.measure import peak_memory, slowest
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.bench.rates import dense_rate, message_rate, unshared_rate
-from fxcrack.errors import FxcrackError, InputError
+from fxcrack.condensation.options import CondensedOptions
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_3d
-from fxcrack.solve.machine import machine_name
-from fxcrack.solve.options import CondensedOptions
+from fxcrack.steps.end_conditions import CrackLength
 from fxcrack.steps.static import Static
-from fxcrack.steps.until import CrackLength
 
 SHAPES = ("block", "plate", "plane")
 """A cube cut by a crack; the thin 3-D arms of "dcb3d"; those of "dcb2d"."""
@@ -142,27 +142,27 @@ def measure(case: Case, comm: MPI.Intracomm) -> Result:
     clock.append(time.perf_counter())
     (debond,) = scene.debonds
     if case.ahead:
-        scene.model.prepare([True], [LENGTHS[-1] - LENGTHS[0]])
+        scene.solver.prepare([True], [LENGTHS[-1] - LENGTHS[0]])
     else:
         reach = LENGTHS[0] + _ROWS * problem.dx
         scene.run(Static(until=CrackLength(debond.interface, reach)), progress=False)
-        scene.model.displacement().destroy()
+        scene.solver.displacement().destroy()
     end = time.perf_counter()
-    spent = scene.model.timings.seconds
+    spent = scene.solver.timings.seconds
     seconds = {"mesh": clock[1] - clock[0], "scene": clock[2] - clock[1]}
     for phase in ("assemble", "transform", "factor_with_schur", "factor_inner", "multigrid"):
         seconds[phase] = spent.get(phase, 0.0)
     seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "march", "fields")}
     seconds["total"] = end - clock[0] - (clock[3] - clock[2])
-    system = scene.model.system
-    store = scene.model.columns
+    system = scene.solver.system
+    store = scene.solver.columns
     space = store.space if store is not None else None
     result: Result = {
         **asdict(case),
         "dim": case.dim,
         "dofs": scene.continuum.n_global,
-        "window": system.n_window,
-        "releases": sum(g.n_released for g in scene.growths),
+        "window": system.n_retained,
+        "releases": sum(g.n_released for g in scene.cracks),
         "seconds": {k: slowest(comm, v) for k, v in seconds.items()},
         "columns": len(space.known) if space is not None else 0,
         "iterations": float(np.mean(space.iterations)) if space is not None else 0.0,

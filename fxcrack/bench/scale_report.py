@@ -8,7 +8,7 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from fxcrack.solve.cost import Constants, Estimate, Task
+from fxcrack.bench.cost import Constants, Estimate, Task
 
 Result = dict[str, Any]
 

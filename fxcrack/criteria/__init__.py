@@ -4,23 +4,22 @@ Modes and local components are always in the order (I, II, III) = (normal, growt
 tangent); arrays have one row per front node.
 """
 
-from fxcrack.criteria.closure import closure_rates
-from fxcrack.criteria.cod import CrackOpening
-from fxcrack.criteria.crack_length import CrackLengthVsTime
+from fxcrack.criteria.crack_closure import closure_rates, energy_release_rates
+from fxcrack.criteria.crack_length_vs_time import CrackLengthVsTime
+from fxcrack.criteria.crack_opening import CrackOpening
 from fxcrack.criteria.critical_stress import CriticalStress
-from fxcrack.criteria.enhanced import EnhancedVCCT
+from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.fatigue import CycleJump, Fatigue, Paris, Regime, cycle_jump
 from fxcrack.criteria.mixed_mode import BK, MixedMode, Power, Reeder, clip, total
-from fxcrack.criteria.rate_criterion import RateCriterion
-from fxcrack.criteria.release import (
+from fxcrack.criteria.release_laws import (
     AmplitudeRelease,
-    Progressive,
-    Ramp,
+    ProgressiveRelease,
+    RampRelease,
     Release,
-    Step,
+    StepRelease,
 )
 from fxcrack.criteria.toughness import Property, Tabulated
-from fxcrack.criteria.vcct import VCCT, energy_release_rates
+from fxcrack.criteria.vcct import VCCT, EnhancedVCCT
 
 __all__ = [
     "BK",
@@ -35,14 +34,14 @@ __all__ = [
     "MixedMode",
     "Paris",
     "Power",
-    "Progressive",
+    "ProgressiveRelease",
     "Property",
-    "Ramp",
+    "RampRelease",
     "RateCriterion",
     "Reeder",
     "Regime",
     "Release",
-    "Step",
+    "StepRelease",
     "Tabulated",
     "clip",
     "closure_rates",

@@ -13,9 +13,15 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria.checks import Array, not_negative, number, positive
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import not_negative, number, positive
+from fxcrack.base.errors import InputError
+from fxcrack.criteria.at_distance import _ROUND_OFF, _AtDistance, _on_face
 from fxcrack.criteria.toughness import Tabulated
-from fxcrack.errors import InputError
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.tips import Tips
+from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,7 @@ class CriticalStress:
                 )
 
     @property
-    def window(self) -> tuple[float, float]:
+    def release_range(self) -> tuple[float, float]:
         """Lower and upper limit of f at which a node may debond."""
         return 1.0 - self.tolerance, 1.0 + self.tolerance
 
@@ -102,3 +108,78 @@ class CriticalStress:
         t[..., 0] = np.maximum(t[..., 0], 0.0)
         relative = t / self.strength(temperature)
         return np.asarray(np.hypot(np.hypot(relative[..., 0], relative[..., 1]), relative[..., 2]))
+
+
+class StressEvaluator(_AtDistance):
+    """Critical stress at a distance ahead of the tip, measured along the slave surface.
+
+    Where fewer bonded nodes than that lie ahead (the end of the surface or another crack is
+    near), the last of them counts.
+
+    Args:
+        solver: Condensed model, with its front in the initial state.
+        p: Number of the pair.
+        criterion: Strengths and distance.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
+
+    Raises:
+        InputError: The distance lies outside the bonded part ahead of an initial tip on a line
+            (a warning on a surface), or a strength depends on temperature and there is none.
+    """
+
+    behind = 0.0
+
+    def __init__(
+        self,
+        solver: LinearSolver,
+        p: int,
+        criterion: CriticalStress,
+        temperature: Array | None = None,
+    ) -> None:
+        super().__init__(solver, p, criterion.distance, temperature)
+        self.criterion = criterion
+        criterion.strength(temperature)
+        self.ahead = criterion.distance + self.paths.longest
+        self._starting = True
+        self._check_start()
+        self._starting = False
+
+    def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
+        way = self.paths.ahead(tips, i, self.distance * (1.0 - 1e-12))
+        reach = float(way.s[-1])
+        if self.distance > reach * (1.0 + 1e-12) and self._starting:
+            problem = (
+                f"{self.where(int(tips.node[i]))}: CriticalStress distance {self.distance:g} lies "
+                f"outside the bonded part, which ends {reach:g} ahead of the tip"
+            )
+            if self.surface.dim == 1:
+                raise InputError(f"{problem}; give a smaller distance")
+            # the direction of growth may point out of the side of a body
+            log.warn("%s; the stress at its last node is used", problem)
+        if len(way.nodes) == 1:
+            return way.nodes, np.ones(1)
+        return _on_face(way, way.s[:, None], min(self.distance, reach), self.surface.order)
+
+    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+        """Traction in the tip frame (normal, growth direction, front), shape (n, 3)."""
+        stencil = self.stencil(tips)
+        index = self.solver.index[self.p][stencil.nodes]
+        rows = np.unique(index[index >= 0])
+        values = np.zeros(self.solver.system.n_retained)
+        values[rows] = -self.solver.system.forces(state, rows)
+        traction = self.solver.vectors(self.p, stencil.nodes, values)
+        traction = stencil(traction / self.surface.areas[stencil.nodes][..., None])
+        out = np.asarray(np.einsum("nci,nc->ni", tips.frame, traction))
+        # a component that symmetry makes vanish must not become a cause of growth by its round-off
+        out[np.abs(out) < _ROUND_OFF * np.abs(out).max(initial=0.0)] = 0.0
+        return out
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F and the stresses s11 (normal), s12 (growth direction) and in 3-D s13 (front)."""
+        names = ("s11", "s12", "s13")[: self.solver.continuum.gdim]
+        f = self.criterion.value(measured, self.temperature_at(tips))
+        return f, dict(zip(names, measured.T, strict=False))
+
+    def needs(self, tips: Tips) -> Ints:
+        """The nodes whose forces are used."""
+        return np.asarray(self.stencil(tips).nodes.ravel())

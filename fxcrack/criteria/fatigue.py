@@ -22,10 +22,11 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria.checks import Array, Bools, not_negative, number, positive
+from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.checks import not_negative, number, positive
+from fxcrack.base.errors import InputError
+from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.mixed_mode import total
-from fxcrack.criteria.rate_criterion import RateCriterion
-from fxcrack.errors import InputError
 
 
 class Regime(IntEnum):

@@ -19,7 +19,8 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria.checks import Array, positive
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import positive
 
 
 class MixedMode(Protocol):

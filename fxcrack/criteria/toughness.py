@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.criteria.checks import Array, number, positive, table
-from fxcrack.errors import InputError
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import number, positive, table
+from fxcrack.base.errors import InputError
 
 
 @dataclass(frozen=True)

@@ -12,16 +12,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-import numpy.typing as npt
 
-from fxcrack.errors import InterfaceError
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InterfaceError
 from fxcrack.interface.surface import FacetSurface
-from fxcrack.interface.tip import Tip, Tips, cross, gradient, norm
-from fxcrack.mesh.raw import place
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
+from fxcrack.interface.tips import Tip, Tips, cross, gradient, norm
 
 _EDGES = {
     "interval": ((0, 1),),
@@ -98,7 +94,7 @@ class Front:
                 ends == 2
             )
             if np.any(wrong):
-                where = place(self.surface.x[facets[np.argmax(wrong), 2]])
+                where = format_point(self.surface.x[facets[np.argmax(wrong), 2]])
                 raise InterfaceError(
                     f"interface '{self.title}': the tip at {where} is a midside node; on "
                     "second-order faces the open part must cover whole element faces, "
@@ -358,6 +354,6 @@ def why_no_tip(front: Front) -> str:
     share = {0: "none", len(x): "all"}.get(n, f"{n}")
     return (
         f"interface '{front.title}' has no crack tip: {share} of its {len(x)} slave nodes, between "
-        f"{place(x.min(axis=0))} and {place(x.max(axis=0))}, are bonded, and no open one is beside "
-        "a bonded one"
+        f"{format_point(x.min(axis=0))} and {format_point(x.max(axis=0))}, are bonded, and no open "
+        "one is beside a bonded one"
     )

@@ -13,16 +13,14 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack import log
-from fxcrack.continuum import Continuum
-from fxcrack.errors import InputError, InterfaceError
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InputError, InterfaceError
+from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface, gather_surface
-from fxcrack.mesh.raw import place
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
-Bools = npt.NDArray[np.bool_]
 _FACING = -0.5
 """Cosine between the outward normals of two surfaces that face each other, at most."""
 Bonded = str | Callable[[Array], Array] | Array | None
@@ -219,7 +217,7 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
         if len(stray):
             found = (
                 f"{where}: {len(stray)} nodes of bonded set '{chosen}' are not slave nodes, one of "
-                f"them at {place(stray[0])}"
+                f"them at {format_point(stray[0])}"
             )
             if interface.strict:
                 raise InterfaceError(
@@ -294,9 +292,9 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
         i = int(np.argmax(np.where(lost, foot.distance, -1.0)))
         raise InterfaceError(
             f"{where}: {int(lost.sum())} bonded slave nodes lie outside the master surface "
-            f"'{interface.master}', the farthest at {place(slave.x[i])} by {foot.distance[i]:.3g} "
-            f"(search tolerance {tolerance:.3g}); let the master surface extend under them, "
-            "take them out of the bonded set, or raise Interface(tolerance=...)"
+            f"'{interface.master}', the farthest at {format_point(slave.x[i])} by "
+            f"{foot.distance[i]:.3g} (search tolerance {tolerance:.3g}); let the master "
+            "surface extend under them, take them out of the bonded set, or raise Interface(tolerance=...)"
         )
     normals = np.where(slave.order >= 1, -slave.normals, 0.0)
     gap = np.einsum("ni,ni->n", slave.x - foot.foot, normals)

@@ -11,15 +11,12 @@ from functools import cached_property, lru_cache
 
 import basix
 import numpy as np
-import numpy.typing as npt
 
-from fxcrack import compat
-from fxcrack.continuum import Continuum
-from fxcrack.errors import InterfaceError, agree
-from fxcrack.mesh.raw import place
-
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from fxcrack.base import compat
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InterfaceError, raise_on_all_ranks
+from fxcrack.continuum.continuum import Continuum
 
 _FLAT = 1e-10
 """Facets smaller than this fraction of the others have no length."""
@@ -207,7 +204,7 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
             f"facet group '{name}' has facets inside the body; slave and master surfaces must be "
             "boundaries: mesh the two sides apart, or split the mesh there (fxcrack.Split)"
         )
-    agree(continuum.comm, problem, InterfaceError)
+    raise_on_all_ranks(continuum.comm, problem, InterfaceError)
 
     element = continuum.space.element.basix_element
     kind, table = _closure_table(element.cell_type, continuum.order)
@@ -265,7 +262,7 @@ def _check_facets(surface: FacetSurface) -> None:
     least = size.min(axis=1)
     flat = np.flatnonzero(~(least > _FLAT * np.median(least)))
     if len(flat):
-        where = place(surface.x[surface.facets[flat[0]]].mean(axis=0))
+        where = format_point(surface.x[surface.facets[flat[0]]].mean(axis=0))
         raise InterfaceError(
             f"facet group '{surface.name}' has {len(flat)} facets without length or area, the "
             f"first at {where}; merge their nodes or mesh the surface again"

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import numpy as np
 import numpy.typing as npt
 from dolfinx.mesh import Mesh as Domain
 from mpi4py import MPI
 
-from fxcrack.errors import MeshError
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh.mesh import Group, Mesh
 from fxcrack.mesh.raw import RawMesh, distinct
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.la
 import dolfinx.mesh
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.errors import MeshError, agree
+from fxcrack.base.errors import MeshError, raise_on_all_ranks
 from fxcrack.mesh.mesh import Group, Mesh
 from fxcrack.mesh.raw import RawMesh, check_shapes
 
@@ -50,9 +50,9 @@ def mesh_from_domain(
         )
     if any(other != asked for other in comm.allgather(asked)):
         problem = "the ranks name different groups; pass the same names and dimensions on each"
-    agree(comm, _headed(name, problem), MeshError)
+    raise_on_all_ranks(comm, _headed(name, problem), MeshError)
 
-    agree(comm, _headed(name, _geometry_fault(domain)), MeshError)
+    raise_on_all_ranks(comm, _headed(name, _geometry_fault(domain)), MeshError)
 
     found: dict[str, Group] = {}
     for key, (dim, choice) in groups.items():
@@ -63,7 +63,7 @@ def mesh_from_domain(
             entities = dolfinx.mesh.locate_entities(domain, dim, choice)
         else:
             entities = np.asarray(choice)
-            agree(comm, _headed(name, _fault(domain, key, dim, entities)), MeshError)
+            raise_on_all_ranks(comm, _headed(name, _fault(domain, key, dim, entities)), MeshError)
         found[key] = Group(dim, _on_all_ranks(domain, dim, entities))
     return Mesh(domain, found, name)
 

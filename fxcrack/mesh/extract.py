@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from typing import Any
 
-from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import numpy as np
 from dolfinx.mesh import CellType
 
-from fxcrack.errors import MeshError
-from fxcrack.mesh.raw import Floats, Ints, RawGroup, RawMesh, distinct, place
+from fxcrack.base.arrays import Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import MeshError
+from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct
 
 _CELLS = {
     2: ("triangle", 1),
@@ -74,8 +76,8 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
         if len(stray):
             where = coordinates[np.searchsorted(node_tags, element_nodes[stray[0]])]
             raise MeshError(
-                f"{label} has a node at {place(where)} that belongs to no cell; take it out of the "
-                f"group, or embed it in the mesh (gmsh.model.mesh.embed, or fragment)"
+                f"{label} has a node at {format_point(where)} that belongs to no cell; take it out "
+                "of the group, or embed it in the mesh (gmsh.model.mesh.embed, or fragment)"
             )
         width = raw.n_entity_nodes(dim)
         if len(index) % width or len(element_tags) != len(index) // width:
@@ -128,8 +130,8 @@ def _check_plane(points: Floats, tdim: int) -> None:
     if len(off):
         raise MeshError(
             f"surface cells must lie in the plane z = 0, but {len(off)} of {len(points)} nodes do "
-            f"not, the first at {place(points[off[0]])}; move the model there, or mesh the volume "
-            f"for a 3-D analysis"
+            f"not, the first at {format_point(points[off[0]])}; move the model there, or mesh the "
+            "volume for a 3-D analysis"
         )
 
 
@@ -173,6 +175,6 @@ def _check_nodes(raw: RawMesh) -> None:
         midside = group.rows[~is_vertex[group.rows[:, 0]], 0] if group.dim == 0 else []
         if len(midside):
             raise MeshError(
-                f"group '{name}' has the midside node at {place(raw.points[midside[0]])}; only "
-                f"corner nodes of cells can be in a group of nodes: move the element ends there"
+                f"group '{name}' has the midside node at {format_point(raw.points[midside[0]])}; "
+                "only corner nodes of cells can be in a group of nodes: move the element ends there"
             )

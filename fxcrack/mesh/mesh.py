@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fxcrack import compat  # isort: skip  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.mesh
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from fxcrack.errors import MeshError, did_you_mean
+from fxcrack.base.errors import MeshError, did_you_mean
 
 
 @dataclass(frozen=True)

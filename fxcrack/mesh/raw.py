@@ -17,9 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
-from fxcrack.errors import FxcrackError, MeshError, agree
+from fxcrack.base.arrays import Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import FxcrackError, MeshError, raise_on_all_ranks
 
-Ints = npt.NDArray[np.int64]
 Floats = npt.NDArray[np.float64]
 
 T = TypeVar("T")
@@ -124,13 +125,6 @@ def distinct(rows: Ints, n_vertices: int) -> tuple[Ints, Ints]:
     return kept.astype(np.int64), position[ids]
 
 
-def place(point: npt.ArrayLike) -> str:
-    """A point as messages show it; round-off counts as 0."""
-    x = np.ravel(point)
-    x = np.where(np.abs(x) <= 1e-12 * np.abs(x).max(initial=0.0), 0.0, x)
-    return "(" + ", ".join(f"{v:.6g}" for v in x.tolist()) + ")"
-
-
 def check_shapes(raw: RawMesh) -> None:
     """Refuse coordinates that are not numbers and cells without volume or folded over.
 
@@ -144,7 +138,7 @@ def check_shapes(raw: RawMesh) -> None:
     if len(bad_nodes):
         raise MeshError(
             f"{len(bad_nodes)} of {len(raw.points)} nodes have a coordinate that is not a finite "
-            f"number, the first is {place(raw.points[bad_nodes[0]])}; mesh the model again"
+            f"number, the first is {format_point(raw.points[bad_nodes[0]])}; mesh the model again"
         )
     points, _ = basix.make_quadrature(basix.CellType[raw.cell], 2 * raw.order)
     gradients = reference(raw.cell, raw.order).tabulate(1, points)[1:, :, :, 0]
@@ -161,7 +155,8 @@ def check_shapes(raw: RawMesh) -> None:
         centre = raw.points[raw.cells[found[0]]].mean(axis=0)
         raise MeshError(
             f"{len(found)} of {len(raw.cells)} cells are degenerate (no volume, or folded over), "
-            f"the first at {place(centre)}; mend the geometry there or change the element size"
+            f"the first at {format_point(centre)}; mend the geometry there or change the "
+            "element size"
         )
 
 
@@ -189,7 +184,7 @@ def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
         except Exception as error:  # whatever it is, the other ranks must hear of it
             problem, cause = f"{type(error).__name__} while making a mesh: {error}", error
     try:
-        agree(comm, problem, MeshError)
+        raise_on_all_ranks(comm, problem, MeshError)
     except MeshError as error:
         raise error from cause
     return result

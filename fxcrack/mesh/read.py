@@ -12,8 +12,8 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fxcrack.arguments import several
-from fxcrack.errors import MeshError
+from fxcrack.base.checks import check_list
+from fxcrack.base.errors import MeshError
 from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.extract import extract
 from fxcrack.mesh.mesh import Mesh
@@ -43,7 +43,7 @@ def read_mesh(
         MeshError: The file is missing or not a .msh file, or as :func:`mesh_from_gmsh`.
     """
     path = Path(path)
-    split = several("read_mesh", "split", split, Split)
+    split = check_list("read_mesh", "split", split, Split)
 
     def work() -> RawMesh:
         if path.suffix.lower() != ".msh":
@@ -87,7 +87,7 @@ def mesh_from_gmsh(
             z = 0, coordinates that are not numbers, degenerate cells, a name used in two
             dimensions, a group without elements or off the cells, a surface that cannot be split.
     """
-    split = several("mesh_from_gmsh", "split", split, Split)
+    split = check_list("mesh_from_gmsh", "split", split, Split)
 
     def work() -> RawMesh:
         if model is None:

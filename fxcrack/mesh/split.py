@@ -15,8 +15,10 @@ import numpy.typing as npt
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
-from fxcrack.errors import MeshError
-from fxcrack.mesh.raw import Floats, Ints, RawGroup, RawMesh, distinct, place, reference, row_ids
+from fxcrack.base.arrays import Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import MeshError
+from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct, reference, row_ids
 
 _AMBIGUOUS = 1e-6
 
@@ -220,7 +222,7 @@ def _check_two_sided(
     n_cells = np.bincount(facet_ids, minlength=int(surface_ids.max()) + 1)[surface_ids]
     bad = np.flatnonzero(n_cells != 2)[0]
     n_vertices = raw.n_vertices(raw.tdim - 1)
-    where = place(raw.points[raw.groups[surface].rows[bad, :n_vertices]].mean(axis=0))
+    where = format_point(raw.points[raw.groups[surface].rows[bad, :n_vertices]].mean(axis=0))
     n_bad = int((n_cells != 2).sum())
     if n_cells[bad] == 0:
         raise MeshError(
@@ -273,7 +275,7 @@ def _slave_sides(raw: RawMesh, split: Split, corners: _Corners) -> Ints:
     if len(unclear):
         first = np.flatnonzero(patch[:, 0] == unclear[0])
         first = first if len(first) else np.flatnonzero(patch[:, 1] == unclear[0])
-        where = place(raw.points[corners.nodes[cell[first[0], 0]]].mean(axis=0))
+        where = format_point(raw.points[corners.nodes[cell[first[0], 0]]].mean(axis=0))
         raise MeshError(
             f"toward={split.toward!r} does not tell the sides of '{split.surface}' apart near "
             f"{where}: it is perpendicular to the normal there, or the surface closes on itself; "
@@ -315,7 +317,7 @@ def _check_branches(raw: RawMesh, surface: str, nodes: Ints, piece: Ints) -> Non
     held = np.unique(np.column_stack((nodes.ravel(), piece.ravel())), axis=0)
     owners, counts = np.unique(held[:, 0], return_counts=True)
     if np.any(counts > 2):
-        where = place(raw.points[owners[counts > 2][0]])
+        where = format_point(raw.points[owners[counts > 2][0]])
         raise MeshError(
             f"'{surface}' branches or crosses itself at {where}; give its branches names of their "
             f"own and split along one after the other"

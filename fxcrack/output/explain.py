@@ -56,13 +56,13 @@ class Explanation:
 
 def explain(scene: Scene) -> Explanation:
     """Look at a scene; the same on every rank."""
-    model = scene.model
+    model = scene.solver
     unknowns = {"displacements": scene.continuum.n_global}
     counts = {"form terms": 1, "factorisations": model.timings.factorizations}
     costs: dict[str, float] = {}
     if hasattr(model, "system"):
         system = model.system
-        unknowns["jumps in the window"] = system.n_window
+        unknowns["jumps in the window"] = system.n_retained
         for kind, number in (
             ("contact nodes", int(system.contact.sum())),
             ("friction nodes", 0 if system.friction is None else len(system.friction.rows)),

@@ -9,16 +9,16 @@ from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
-from fxcrack import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import dolfinx.plot
 import numpy as np
 from dolfinx import fem
 
-from fxcrack.errors import InputError
+from fxcrack.base.errors import InputError
+from fxcrack.base.files import replacing
+from fxcrack.base.parallel import all_or_none
+from fxcrack.history import Row
 from fxcrack.interface.pairing import Pair
-from fxcrack.output.atomic import replacing
-from fxcrack.output.collective import together
-from fxcrack.output.history import Row
 from fxcrack.output.interface_fields import InterfaceFields, in_space, interface_fields
 from fxcrack.output.vtu import FACETS, Grid, write_grid, write_header, write_series
 
@@ -32,10 +32,10 @@ def displacement_function(scene: Scene) -> fem.Function:
     Raises:
         InputError: No step was run yet.
     """
-    if not hasattr(scene.model, "state"):
+    if not hasattr(scene.solver, "state"):
         raise InputError("the scene has no state yet; run a step before asking for fields")
     u = fem.Function(scene.continuum.space, name="displacement")
-    vector = scene.model.displacement()
+    vector = scene.solver.displacement()
     u.x.array[: scene.continuum.n_local] = vector.array
     vector.destroy()
     u.x.scatter_forward()
@@ -52,7 +52,7 @@ def stress_function(scene: Scene, u: fem.Function, time: float) -> fem.Function:
         u: Its displacement.
         time: Its time, which tells the temperature.
     """
-    bodies = getattr(scene.model, "bodies", None)
+    bodies = getattr(scene.solver, "bodies", None)
     if bodies is not None:
         return bodies.stress()
     if scene.continuum.temperature is not None:
@@ -202,15 +202,15 @@ class FieldSeries:
             for pair, fields in zip(scene.pairs, interface_fields(scene, u, time), strict=True)
         ]
         task, folder = f"writing fields to '{self.path}'", ""
-        with together(comm, task):
+        with all_or_none(comm, task):
             if comm.rank == 0:
                 self._folder.mkdir(parents=True, exist_ok=True)
                 folder = tempfile.mkdtemp(prefix=f".{self.path.stem}.", dir=self.path.parent)
         temporary = Path(comm.bcast(folder))
         try:
-            with together(comm, task):
+            with all_or_none(comm, task):
                 names = self._write_pieces(temporary, bodies, surfaces)
-            with together(comm, task):
+            with all_or_none(comm, task):
                 if comm.rank == 0:
                     self._publish(temporary, names, float(time))
         finally:

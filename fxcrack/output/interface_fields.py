@@ -14,20 +14,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from fxcrack import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from fxcrack.continuum import Continuum
-from fxcrack.steps.evaluate import TipValues
-from fxcrack.steps.records import bond_state
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.criteria.evaluator import TipValues
+from fxcrack.steps.bond_records import bond_state
 
 if TYPE_CHECKING:
     from fxcrack.scene import Scene
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
 
 _ROUND_OFF = 1e-9
 """Forces below this fraction of the largest bond force count as zero."""
@@ -51,7 +50,7 @@ class InterfaceFields:
         at_front: What the criterion says at the front nodes, 0 elsewhere, each of shape (n_nodes,):
             f, and what is behind it, as GI, GII, GIII and their sum G (force/length).
         bonds: The bonds under the usual output names, see
-            :func:`~fxcrack.steps.records.bond_state`; empty where no criterion is given.
+            :func:`~fxcrack.steps.bond_records.bond_state`; empty where no criterion is given.
     """
 
     displacement: Array
@@ -71,7 +70,7 @@ def residual(scene: Scene, u: fem.Function) -> Array:
     Returns:
         Shape (n_local,), the owned dofs of this rank, force.
     """
-    vector = scene.model.nodal_forces(u.x.petsc_vec)
+    vector = scene.solver.nodal_forces(u.x.petsc_vec)
     values = np.array(vector.array)
     vector.destroy()
     return values
@@ -120,7 +119,7 @@ def interface_fields(
     masters = [np.searchsorted(blocks, p.masters) for p in pairs]
     acting = [
         p.paired & (front.bonded | (index >= 0).any(axis=1))
-        for p, front, index in zip(pairs, scene.model.fronts, scene.model.index, strict=True)
+        for p, front, index in zip(pairs, scene.solver.fronts, scene.solver.index, strict=True)
     ]
     total = direct
     for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
@@ -145,32 +144,32 @@ def _fields_of(
     scene: Scene, p: int, slave: Array, masters: Array, force: Array, time: float
 ) -> InterfaceFields:
     """Fields on pair p from the displacements and forces at its nodes."""
-    pair, model = scene.pairs[p], scene.model
+    pair, solver = scene.pairs[p], scene.solver
     surface = pair.surface
     under = np.einsum("nk,nkc->nc", pair.weights, masters)
     opening = np.where(pair.paired[:, None], slave - under, 0.0)
     # a component that a support holds carries the support's reaction, not a bond force
-    local = np.einsum("nck,nc->nk", model.frames[p], force)
-    local[model.held_by_supports[p]] = 0.0
-    bond = np.einsum("nck,nk->nc", model.frames[p], local)
+    local = np.einsum("nck,nc->nk", solver.frames[p], force)
+    local[solver.held_by_supports[p]] = 0.0
+    bond = np.einsum("nck,nk->nc", solver.frames[p], local)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
-    bonded, index = model.fronts[p].bonded, model.index[p]
-    given = np.append(np.abs(model.state.force), 0.0)[index]  # outside the window the index is -1
+    bonded, index = solver.fronts[p].bonded, solver.index[p]
+    given = np.append(np.abs(solver.state.force), 0.0)[index]  # outside the window the index is -1
     largest = np.abs(local).max(initial=0.0)
-    letting_go = ~bonded & (given > _ROUND_OFF * largest).any(axis=1)
-    state = np.where(bonded, 1.0, np.where(letting_go, 0.5, 0.0))
+    force_ramps = ~bonded & (given > _ROUND_OFF * largest).any(axis=1)
+    state = np.where(bonded, 1.0, np.where(force_ramps, 0.5, 0.0))
     state[~pair.paired] = -1.0
     front = np.zeros(surface.n_nodes, dtype=np.int32)
     when = np.where(bonded, np.nan, 0.0)
     at_front: dict[str, Array] = {}
     bonds: dict[str, Array] = {}
-    for growth in scene.growths:
+    for growth in scene.cracks:
         if growth.p == p:
             tips = growth.tips()
             front[tips.node] = 1
             for node, moment in growth.released:
                 when[node] = moment
-            values = growth.evaluate(tips, model.state, time) if model.active[p] else None
+            values = growth.evaluate(tips, solver.state, time) if solver.active[p] else None
             bonds = bond_state(growth, scene.ramps, values)
             if values is not None:
                 at_front = _at_front(values, surface.n_nodes)

@@ -16,8 +16,8 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Ints = npt.NDArray[np.int64]
+from fxcrack.base.arrays import Array, Ints
+
 Data = dict[str, npt.NDArray[Any]]
 
 FACETS: dict[tuple[str, int], tuple[int, tuple[int, ...]]] = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from fxcrack.errors import InputError
-from fxcrack.steps.until import Until, conditions
+from fxcrack.base.errors import InputError
+from fxcrack.steps.end_conditions import Until, conditions
 
 
 @dataclass(frozen=True)

@@ -23,7 +23,7 @@ import fxcrack  # noqa: F401  (orders MPI before DOLFINx)
 # isort: split
 from mpi4py import MPI
 
-from fxcrack.abort import end_all
+from fxcrack.base.parallel import end_all
 from golden.histories import FOLDER, deviation, read, text_of
 from golden.scenes import SCENES, run
 

@@ -436,7 +436,7 @@ SCENES: dict[str, Golden] = {
         lambda comm: front(
             comm,
             criterion=fx.VCCT(GIc=0.2, GIIc=0.5, GIIIc=0.6, mix=fx.Reeder(eta=2.0)),
-            release=fx.Progressive(),
+            release=fx.ProgressiveRelease(),
         ),
         until(6),
     ),
@@ -446,7 +446,7 @@ SCENES: dict[str, Golden] = {
             comm,
             2,
             criterion=fx.VCCT(GIc=0.2, viscosity=1e-2),
-            release=fx.Progressive(),
+            release=fx.ProgressiveRelease(),
         ),
         until(4, initial=0.05, maximum=0.1, **INCREMENTS),
     ),
@@ -454,7 +454,7 @@ SCENES: dict[str, Golden] = {
         "progressive release in small sets of retained jumps, load that turns",
         lambda comm: beam(
             comm,
-            release=fx.Progressive(),
+            release=fx.ProgressiveRelease(),
             supports=[*HELD_FAR, *pins(0.0, 0.3, 0.1, 0.5)],
             faces={"contact": True},
             options=fx.CondensedOptions(rows=2.0),
@@ -463,12 +463,12 @@ SCENES: dict[str, Golden] = {
     ),
     "ramp": Golden(
         "release by a ramp with opening",
-        lambda comm: beam(comm, release=fx.OpeningRamp()),
+        lambda comm: beam(comm, release=fx.RampRelease()),
         until(6),
     ),
     "ramp_increments": Golden(
         "release by a ramp over increments",
-        lambda comm: beam(comm, release=fx.OpeningRamp(increments=3)),
+        lambda comm: beam(comm, release=fx.RampRelease(increments=3)),
         until(4, initial=0.04, maximum=0.04, **INCREMENTS),
     ),
     "viscosity": Golden(
@@ -608,7 +608,7 @@ SCENES: dict[str, Golden] = {
     ),
     "newton_progressive": Golden(
         "progressive release of linear bodies by the nonlinear solver",
-        lambda comm: beam(comm, release=fx.Progressive(), path="newton"),
+        lambda comm: beam(comm, release=fx.ProgressiveRelease(), path="newton"),
         until(3),
     ),
     "two_interfaces": Golden(
@@ -648,7 +648,7 @@ SCENES: dict[str, Golden] = {
         "stopped in the middle of increments and continued from the checkpoint",
         lambda comm: beam(
             comm,
-            release=fx.Progressive(),
+            release=fx.ProgressiveRelease(),
             faces={"contact": True},
             supports=[*HELD_FAR, *pins(0.0, 0.3, 0.1, 0.5)],
         ),

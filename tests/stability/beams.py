@@ -10,7 +10,7 @@ from mpi4py import MPI
 from specimens import specimen
 
 import fxcrack as fx
-from fxcrack import compat
+from fxcrack.base import compat
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
 from stability.watch import Watch, assert_in_balance

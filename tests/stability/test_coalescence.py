@@ -18,10 +18,12 @@ from stability.beams import FAR, SELF, arms, watched
 
 pytestmark = pytest.mark.stability
 
-LAWS = {"at once": fx.Step(), "softening": fx.Progressive()}
+LAWS = {"at once": fx.StepRelease(), "softening": fx.ProgressiveRelease()}
 
 
-def island(comm: MPI.Intracomm, order: int, release: fx.Step | fx.Progressive) -> fx.Scene:
+def island(
+    comm: MPI.Intracomm, order: int, release: fx.StepRelease | fx.ProgressiveRelease
+) -> fx.Scene:
     """A bonded island from 8 to 16 in arms pulled apart at both ends."""
     interface = fx.Interface(
         "upper_face",
@@ -52,13 +54,13 @@ def test_tips_meet(comm: MPI.Intracomm, order: int, law: str) -> None:
     histories = []
     for where in (SELF, comm):
         scene = island(where, order, LAWS[law])
-        bonded = int(scene.model.fronts[0].bonded.sum())
+        bonded = int(scene.solver.fronts[0].bonded.sum())
         # softening bonds need more load after the last has begun to let go
         history = watched(scene, until=fx.Time(50.0))
         assert history.reason == "time 50 reached"
         assert history.rows[-1]["released[bond]"] == bonded == (9 if order == 1 else 17)
-        assert not scene.model.fronts[0].bonded.any() and not scene.model.system.soft.bonds
-        assert len({r.node for r in scene.growths[0].records}) == bonded
+        assert not scene.solver.fronts[0].bonded.any() and not scene.solver.system.soft.bonds
+        assert len({r.node for r in scene.cracks[0].records}) == bonded
         histories.append(history)
         scene.close()
     one, several = histories

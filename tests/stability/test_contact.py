@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from specimens import bond, specimen
 
 import fxcrack as fx
-from fxcrack import compat
+from fxcrack.base import compat
+from fxcrack.equilibrium.contact import ContactSystem
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
-from fxcrack.solve.jump_system import JumpSystem
 from stability.beams import FAR, SELF, arms, shift, watched
 
 pytestmark = pytest.mark.stability
@@ -34,7 +34,7 @@ A0 = 30.0
 
 def contact_of(scene: fx.Scene) -> tuple[Array, Array]:
     """Gaps and pressures of the nodes that may touch, checked to be complementary."""
-    system, state = scene.model.system, scene.model.state
+    system, state = scene.solver.system, scene.solver.state
     where = np.flatnonzero(system.contact)
     gap = (state.jump + system.gap)[where]
     push = system.forces(state, where) - state.force[where]
@@ -184,7 +184,7 @@ def test_contact_at_a_single_node(stepping: str) -> None:
 # -- the dense problem alone -----------------------------------------------------------------------
 
 
-def chattering(n: int, seed: int) -> JumpSystem:
+def chattering(n: int, seed: int) -> ContactSystem:
     """S = tridiagonal with off-diagonals of both signs, nearly singular, pushed by turns."""
     rng = np.random.default_rng(seed)
     q, _ = np.linalg.qr(rng.standard_normal((n, n)))
@@ -193,15 +193,15 @@ def chattering(n: int, seed: int) -> JumpSystem:
     schur[:n, :n] = 0.5 * (schur[:n, :n] + schur[:n, :n].T)
     schur[:n, n] = schur[n, :n] = np.where(np.arange(n) % 2, 1.0, -1.0) * rng.uniform(0.1, 1.0, n)
     schur[n, n] = 1e9
-    system = JumpSystem(schur, n, 1, 0)
+    system = ContactSystem(schur, n, 1, 0)
     system.release(np.arange(n))
     system.contact[:] = True
     return system
 
 
-def enumerate_closed(system: JumpSystem) -> Array:
+def enumerate_closed(system: ContactSystem) -> Array:
     """Jumps of the only consistent set, all 2^n tried."""
-    n = system.n_window
+    n = system.n_retained
     s, g = system.schur[:n, :n], system.schur[:n, n]
     best, least = np.zeros(n), np.inf
     for closed in product([False, True], repeat=n):
@@ -247,7 +247,7 @@ def test_active_set_that_cycles_is_left() -> None:
         schur[k : k + 3, n] = schur[n, k : k + 3] = [-2.0, -1.0, 3.0]
     schur[n, n] = 100.0
     for closed in product([False, True], repeat=3):
-        system = JumpSystem(schur, n, 1, 0)
+        system = ContactSystem(schur, n, 1, 0)
         system.release(np.arange(n))
         system.contact[:] = True
         system._set_closed(np.tile(closed, n // 3))

@@ -26,9 +26,9 @@ from mpi4py import MPI
 from specimens import dcb, grow_to
 
 import fxcrack as fx
-from fxcrack.abort import all_arrive
-from fxcrack.interrupt import Interrupted, Listener
-from fxcrack.output.running import HistoryFile
+from fxcrack.base.parallel import all_arrive
+from fxcrack.base.signals import Interrupted, Listener
+from fxcrack.restart.history_file import HistoryFile
 
 pytestmark = pytest.mark.stability
 
@@ -220,7 +220,7 @@ def test_no_space_left_on_a_small_disk(tmp_path: Path, undisturbed: list[dict[st
 STOP_DEMO = """
 import os, signal
 from fxcrack import cli
-from fxcrack.output import progress
+from fxcrack.steps import progress
 rows = 0
 def look(self, event, row):
     global rows

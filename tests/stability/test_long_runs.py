@@ -18,8 +18,8 @@ from specimens import bond
 from test_memory import alive, resident_mb
 
 import fxcrack as fx
+from fxcrack.history import Row
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.output.history import Row
 
 pytestmark = [pytest.mark.stability, pytest.mark.memory]
 
@@ -29,7 +29,7 @@ TURNS = 250
 """Loading, unloading and pressing together; 40 increments each."""
 
 
-def beam(comm: MPI.Intracomm, release: fx.Step | fx.Progressive) -> fx.Scene:
+def beam(comm: MPI.Intracomm, release: fx.StepRelease | fx.ProgressiveRelease) -> fx.Scene:
     """Arms opened a little more in every turn, and pressed together in between."""
     times = np.arange(2 * TURNS + 1) / (2 * TURNS)
     values = np.where(np.arange(2 * TURNS + 1) % 2, 0.18 + 0.25 * times, -0.02 * (times > 0.0))
@@ -47,8 +47,10 @@ def beam(comm: MPI.Intracomm, release: fx.Step | fx.Progressive) -> fx.Scene:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("release", [fx.Step(), fx.Progressive()])
-def test_ten_thousand_increments(release: fx.Step | fx.Progressive, tmp_path: Path) -> None:
+@pytest.mark.parametrize("release", [fx.StepRelease(), fx.ProgressiveRelease()])
+def test_ten_thousand_increments(
+    release: fx.StepRelease | fx.ProgressiveRelease, tmp_path: Path
+) -> None:
     PETSc.Log.begin()
     scene = beam(MPI.COMM_SELF, release)
     memory: list[float] = []
@@ -97,9 +99,9 @@ def test_ten_thousand_increments(release: fx.Step | fx.Progressive, tmp_path: Pa
 
 def test_restoring_states_again_and_again_changes_nothing() -> None:
     """Contact closes and opens 200 times: the updated factor stays that of the open nodes."""
-    scene = beam(MPI.COMM_SELF, fx.Step())
+    scene = beam(MPI.COMM_SELF, fx.StepRelease())
     scene.run(fx.Static(until=fx.Time(1.0 / TURNS), stepping="increment", initial=1e-3))
-    system, zero = scene.model.system, np.zeros(scene.model.system.n_window)
+    system, zero = scene.solver.system, np.zeros(scene.solver.system.n_retained)
     apart, together = (scene.loads_at(k / (2 * TURNS)) for k in (1, 2))
     first = system.equilibrium(apart, zero), system.equilibrium(together, zero)
     steps = system.contact_steps

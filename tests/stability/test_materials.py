@@ -14,7 +14,7 @@ import pytest
 from specimens import PINS, specimen
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from stability.beams import FAR, arms, grown, released_energies
 
 pytestmark = pytest.mark.stability

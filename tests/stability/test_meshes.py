@@ -15,7 +15,7 @@ from mpi4py import MPI
 from specimens import CLAMPED_3D, bond, specimen
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from stability.beams import LENGTH, SELF, arms, grown, released_energies, shift
 
@@ -122,7 +122,7 @@ def test_kept_gaps_close_first(gap: float) -> None:
         criterion=fx.VCCT(GIc=0.2),
     )
     scene.run(fx.Static(until=fx.Time(1.0)), progress=False)
-    system, state = scene.model.system, scene.model.state
+    system, state = scene.solver.system, scene.solver.state
     left = (state.jump + system.gap)[system.contact]
     assert left.min() >= -1e-10 * gap
     # the outer corner has come down by the gap; the face below it is a little further away, for
@@ -142,7 +142,7 @@ def test_overclosure_that_is_kept_is_pushed_apart() -> None:
         criterion=fx.VCCT(GIc=0.2),
     )
     history = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)
-    system, state = scene.model.system, scene.model.state
+    system, state = scene.solver.system, scene.solver.state
     assert (state.jump + system.gap)[system.contact].min() >= -1e-10 * 1e-4
     assert history["R[pin_top.y]"][0] < 0.0  # held against being pushed up
     assert history["R[pin_top.y]"][0] == pytest.approx(-history["R[pin_bottom.y]"][0], rel=1e-9)

@@ -128,8 +128,8 @@ def test_products_of_the_wrong_sign(law: str, heights: tuple[float, float]) -> N
             criterion=fx.VCCT(GIc=0.2, GIIc=0.6, GIIIc=0.6, mix=LAWS[law]),
         )
         history = scene.run(fx.Static(until=fx.Time(1e-2)), progress=False)
-        (growth,) = scene.growths
-        values = growth.evaluate(growth.tips(), scene.model.state, 1e-2)
+        (growth,) = scene.cracks
+        values = growth.evaluate(growth.tips(), scene.solver.state, 1e-2)
         rates = np.stack([values.report[m] for m in ("GI", "GII", "GIII")], axis=1)
         negative += int((rates < 0.0).any())
         expected = LAWS[law].ratio(np.maximum(rates, 0.0), np.array([0.2, 0.6, 0.6]))

@@ -128,7 +128,7 @@ MIXES: tuple[dict[str, Any], ...] = (
     {"GIIc": 0.5, "mix": fx.Power(am=1.0, an=0.7)},
     {"GIIc": 2.0, "GIIIc": 5.0, "mix": fx.Reeder(eta=2.2)},
 )
-LAWS = (fx.Step(), fx.Progressive(), fx.OpeningRamp())
+LAWS = (fx.StepRelease(), fx.ProgressiveRelease(), fx.RampRelease())
 DIRECTIONS = ((0.0, 1.0), (1.0, 0.0), (1.0, 1.0), (-0.5, 1.0))  # of the load at x = 0, (x, y)
 
 
@@ -205,9 +205,9 @@ def onset_of(case: Case) -> float:
 
 
 def _first_values(scene: fx.Scene) -> Any:
-    (growth,) = scene.growths
-    model = scene.model
-    state = model.system.linear(scene.loads_at(1.0), np.zeros(model.system.n_window))
+    (growth,) = scene.cracks
+    model = scene.solver
+    state = model.system.linear(scene.loads_at(1.0), np.zeros(model.system.n_retained))
     return growth.evaluate(growth.tips(), state, 1.0)
 
 

@@ -33,11 +33,13 @@ def owners(scene: fx.Scene) -> npt.NDArray[np.int64]:
     return np.searchsorted(first, scene.pairs[0].surface.dofs, side="right") - 1
 
 
-@pytest.mark.parametrize("release", [fx.Step(), fx.Progressive()])
-def test_front_crosses_borders(comm: MPI.Intracomm, release: fx.Step | fx.Progressive) -> None:
+@pytest.mark.parametrize("release", [fx.StepRelease(), fx.ProgressiveRelease()])
+def test_front_crosses_borders(
+    comm: MPI.Intracomm, release: fx.StepRelease | fx.ProgressiveRelease
+) -> None:
     """A front across the width and the length of a beam that is spread over all ranks."""
     # by exact closure a softening bond is neutral when it begins: round-off decides what it does
-    method = "closure" if isinstance(release, fx.Step) else "vcct"
+    method = "closure" if isinstance(release, fx.StepRelease) else "vcct"
     histories = []
     for where in (SELF, comm):
         scene = specimen(
@@ -53,7 +55,7 @@ def test_front_crosses_borders(comm: MPI.Intracomm, release: fx.Step | fx.Progre
         )
         histories.append(scene.run(fx.Static(until=fx.Releases(60)), progress=False))
         if where is comm and comm.size > 1:
-            gone = [r.node for r in scene.growths[0].records]
+            gone = [r.node for r in scene.cracks[0].records]
             assert len(set(owners(scene)[gone].tolist())) > 1  # it did cross one
         scene.close()
     assert_same(*histories, SAME)

@@ -19,11 +19,11 @@ from mpi4py import MPI
 from specimens import bond, specimen
 
 import fxcrack as fx
-from fxcrack.criteria import Ramp
+from fxcrack.base.parallel import all_or_none
+from fxcrack.criteria import RampRelease
+from fxcrack.history import Row
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.enf import enf_2d
-from fxcrack.output.collective import together
-from fxcrack.output.history import Row
 
 pytestmark = [pytest.mark.stability, pytest.mark.mpi]
 
@@ -61,7 +61,7 @@ class StopAt:
 def short(comm: MPI.Intracomm, release: Any = None, criterion: Any = None, **options: Any):
     """A short cantilever pair whose bonds let go in one of the ways."""
     interface = bond(6.0, contact=options.pop("contact", False))
-    debond = fx.Debond(interface, criterion or fx.VCCT(GIc=0.2), release or fx.Step())
+    debond = fx.Debond(interface, criterion or fx.VCCT(GIc=0.2), release or fx.StepRelease())
     return fx.Scene(
         dcb_2d(comm, length=20.0, dx=1.0, ny=1),
         materials=fx.Isotropic(70e3, 0.3),
@@ -159,13 +159,13 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Releases(8), stepping="path")],
     ),
     "progressive": (
-        lambda comm: short(comm, fx.Progressive()),
+        lambda comm: short(comm, fx.ProgressiveRelease()),
         [fx.Static(until=fx.Releases(8))],
     ),
     "progressive, increments, turning load": (
         lambda comm: short(
             comm,
-            fx.Progressive(),
+            fx.ProgressiveRelease(),
             contact=True,
             supports=[
                 fx.Displacement(
@@ -184,7 +184,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Releases(6))],
     ),
     "ramp over increments": (
-        lambda comm: short(comm, Ramp(increments=4)),
+        lambda comm: short(comm, RampRelease(increments=4)),
         [fx.Static(until=fx.Releases(5), initial=0.02, maximum=0.02, **INCREMENTS)],
     ),
     "viscosity": (
@@ -192,7 +192,9 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Releases(4), initial=0.01, maximum=0.01, **INCREMENTS)],
     ),
     "viscosity, softening": (
-        lambda comm: short(comm, fx.Progressive(), criterion=fx.VCCT(GIc=0.2, viscosity=1e-2)),
+        lambda comm: short(
+            comm, fx.ProgressiveRelease(), criterion=fx.VCCT(GIc=0.2, viscosity=1e-2)
+        ),
         [fx.Static(until=fx.Releases(4), initial=0.01, maximum=0.01, **INCREMENTS)],
     ),
     "release along an amplitude": (
@@ -226,7 +228,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Releases(3), initial=0.1, maximum=0.1, **INCREMENTS)],
     ),
     "nonlinear path, progressive": (
-        lambda comm: short(comm, fx.Progressive(), path="newton"),
+        lambda comm: short(comm, fx.ProgressiveRelease(), path="newton"),
         [fx.Static(until=fx.Releases(4))],
     ),
     "inertia, finite strain": (
@@ -264,16 +266,16 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Releases(15))],
     ),
     "3-D, progressive": (
-        lambda comm: solid(comm, criterion=fx.VCCT(GIc=0.2), release=fx.Progressive()),
+        lambda comm: solid(comm, criterion=fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease()),
         [fx.Static(until=fx.Releases(12))],
     ),
     "3-D, progressive, second order": (
-        lambda comm: solid(comm, 2, criterion=fx.VCCT(GIc=0.2), release=fx.Progressive()),
+        lambda comm: solid(comm, 2, criterion=fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease()),
         [fx.Static(until=fx.Releases(30))],
     ),
     "3-D, viscosity, second order": (
         lambda comm: solid(
-            comm, 2, criterion=fx.VCCT(GIc=0.2, viscosity=1e-2), release=fx.Progressive()
+            comm, 2, criterion=fx.VCCT(GIc=0.2, viscosity=1e-2), release=fx.ProgressiveRelease()
         ),
         [fx.Static(until=fx.Releases(20), initial=0.02, maximum=0.02, **INCREMENTS)],
     ),
@@ -370,7 +372,7 @@ def test_restart_on_another_number_of_ranks(
     stop = round(0.5 * len(whole))
     # one rank, then all of them
     first = fx.Checkpoint(shared_path / "alone.npz", every=1)
-    with together(comm, "the run that rank 0 begins alone"), suppress(Stopped):
+    with all_or_none(comm, "the run that rank 0 begins alone"), suppress(Stopped):
         if comm.rank == 0:
             run(name, MPI.COMM_SELF, first, observers=[StopAt(stop)])
     assert_same_history(whole, run(name, comm, first, restart=True))
@@ -378,7 +380,7 @@ def test_restart_on_another_number_of_ranks(
     shared = fx.Checkpoint(shared_path / "shared.npz", every=1)
     with pytest.raises(Stopped):
         run(name, comm, shared, observers=[StopAt(stop)])
-    with together(comm, "the run that rank 0 ends alone"):
+    with all_or_none(comm, "the run that rank 0 ends alone"):
         if comm.rank == 0:
             assert_same_history(whole, run(name, MPI.COMM_SELF, shared, restart=True))
 
@@ -393,14 +395,14 @@ def test_tips_released_and_tables_are_restored(comm: MPI.Intracomm, shared_path:
         run("fatigue", comm, checkpoint, observers=[StopAt(5)])
     again = make(comm)
     again.run(step, checkpoint=checkpoint, restart=True)
-    assert len(again.growths[0].records) == len(whole.growths[0].records) == 6
-    for a, b in zip(again.growths[0].records, whole.growths[0].records, strict=True):
+    assert len(again.cracks[0].records) == len(whole.cracks[0].records) == 6
+    for a, b in zip(again.cracks[0].records, whole.cracks[0].records, strict=True):
         assert (a.node, a.DBT) == (b.node, pytest.approx(b.DBT, rel=SAME))
         assert a.CRSTS == pytest.approx(b.CRSTS, rel=SAME, abs=SAME * max(map(abs, b.CRSTS)))
     assert again.fatigue.table["node"] == whole.fatigue.table["node"]
     assert again.fatigue.table["dG"] == pytest.approx(whole.fatigue.table["dG"], rel=SAME)
     # fields come from the state, not from the rows
-    u, v = again.model.displacement(), whole.model.displacement()
+    u, v = again.solver.displacement(), whole.solver.displacement()
     v.axpy(-1.0, u)
     assert v.norm() <= 1e-9 * u.norm()  # an equilibrium solved on another factor: round-off
     for vector in (u, v):

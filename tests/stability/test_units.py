@@ -33,7 +33,7 @@ def debond(length: float, a0: float, criterion: fx.VCCT, release: Any = None) ->
         contact=True,
         name="bond",
     )
-    return [fx.Debond(bond, criterion, release or fx.Step())]
+    return [fx.Debond(bond, criterion, release or fx.StepRelease())]
 
 
 def enf(m: float, n: float, **options: Any) -> fx.Scene:
@@ -124,7 +124,7 @@ PROBLEMS: dict[str, tuple[Callable[[float, float], fx.Scene], fx.Static]] = {
     ),
     "second order": (lambda m, n: dcb(m, n, order=2), fx.Static(until=fx.Releases(8))),
     "softening": (
-        lambda m, n: dcb(m, n, release=fx.Progressive()),
+        lambda m, n: dcb(m, n, release=fx.ProgressiveRelease()),
         fx.Static(until=fx.Releases(8)),
     ),
     "forces along the path": (pulled, fx.Static(until=fx.Releases(8), stepping="path")),

@@ -20,7 +20,7 @@ import scipy.sparse.linalg
 from specimens import gathered, specimen
 
 import fxcrack as fx
-from fxcrack.beams import CorrectedBeam
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.meshes.enf import enf_2d
 from stability.beams import FAR, SELF, arms, watched
 
@@ -45,7 +45,7 @@ def potentials(load: float) -> tuple[Array, Array]:
     mesh = arms(length=SHORT)
     scene = specimen(mesh, a0=A0, supports=FAR, loads=FORCES)
     scene.run(fx.Static(until=fx.Time(1e-9)), progress=False)
-    k = gathered(scene.model._stiffness)
+    k = gathered(scene.solver._stiffness)
     pair = scene.pairs[0]
     x = scene.continuum.positions()
     n = k.shape[0]
@@ -105,7 +105,7 @@ def test_short_beam_under_load_control(toughness: Any) -> None:
     history = watched(scene, until=fx.Time(float(history.rows[-1]["time"]) * (1.0 + 1e-6)))
     end = history.rows[-1]
     if stop is None:
-        assert not len(scene.growths[0].tips())
+        assert not len(scene.cracks[0].tips())
         assert end["a[bond]"] == pytest.approx(SHORT)
     else:
         assert end["a[bond]"] == pytest.approx(stop)

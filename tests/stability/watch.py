@@ -8,15 +8,15 @@ import numpy as np
 from specimens import gathered, gathered_vector
 
 import fxcrack as fx
-from fxcrack.output.history import Row
-from fxcrack.solve.soft_bond import SoftBond
+from fxcrack.equilibrium.cohesive_law import CohesiveBond
+from fxcrack.history import Row
 
 PENETRATION = 1e-10  # of the largest jump: asked for
 FORCE = 1e-11  # of the sum of |stiffness| |displacement| a force is the difference of: round-off
 BALANCE = 1e-8  # of the work: where bonds change branch is found to 1e-6 of their force
 
 
-def stored_in(bond: SoftBond, opening: float) -> float:
+def stored_in(bond: CohesiveBond, opening: float) -> float:
     """What a softening bond would give back on its way to zero force."""
     most = opening if bond.largest is None else bond.largest
     return 0.5 * bond.force(opening) ** 2 / replace(bond, largest=most).secant
@@ -32,17 +32,17 @@ class Watch:
 
     def __init__(self, scene: fx.Scene, work: float = 0.0) -> None:
         self.scene = scene
-        self.bonded = scene.model.fronts[0].bonded.copy()
+        self.bonded = scene.solver.fronts[0].bonded.copy()
         self.dissipated = self.terms = self.jump = 0.0
         self.work = work  # what a load does between two rows is not seen
         self.count = 0
 
     def __call__(self, event: str, row: Row) -> None:
-        model = self.scene.model
+        model = self.scene.solver
         system, state = model.system, model.state
         front, index = model.fronts[0], model.index[0]
         assert all(np.isfinite(v) for k, v in row.items() if k != "event"), row
-        force = system.forces(state, np.arange(system.n_window))
+        force = system.forces(state, np.arange(system.n_retained))
         last = np.abs(np.concatenate([state.jump, state.loads]))
         terms = np.abs(system.schur[: len(last), : len(last)]) @ last
         # where the load passes zero, what is left is round-off of the largest load so far
@@ -55,7 +55,7 @@ class Watch:
         # bonds are shut; what is released carries what its law says and no more
         held = index[front.bonded]
         assert np.all(state.jump[held[held >= 0]] == 0.0)
-        soft = np.zeros(system.n_window, dtype=bool)
+        soft = np.zeros(system.n_retained, dtype=bool)
         soft[system.soft.components] = True
         free = system.free & ~soft
         assert np.abs(force - state.force)[free].max(initial=0.0) <= slack
@@ -86,7 +86,7 @@ class Watch:
 
 def assert_in_balance(scene: fx.Scene) -> None:
     """K u - f on the mesh: zero at free nodes, opposite at the two sides of the interface."""
-    model = scene.model
+    model = scene.solver
     u = model.displacement()
     vector = model.nodal_forces(u)
     gdim = scene.mesh.gdim

@@ -1,0 +1,1 @@
+"""Foundation: types, errors, checks, logging, files, processes, the DOLFINx version layer."""

@@ -1,0 +1,1 @@
+"""From the stiffness K to the dense matrix S on the retained jumps."""

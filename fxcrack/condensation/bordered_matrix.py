@@ -1,0 +1,173 @@
+"""Borders of the bordered matrix: force patterns and monitored displacements."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fxcrack.base import compat
+from fxcrack.base.arrays import Ints
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.interface.jump_coordinates import JumpCoordinates
+
+
+def load_and_monitor_vectors(
+    continuum: Continuum, loads: list[Load], monitors: list[Monitor], followed: Sequence[Ints] = ()
+) -> list[PETSc.Vec]:
+    """Force patterns with the minus sign, then monitors, as vectors on displacements; collective.
+
+    Args:
+        continuum: Displacement space.
+        loads: Force patterns.
+        monitors: Monitored displacements.
+        followed: Sets of this rank's nodes whose mean displacement is wanted, all components.
+    """
+    out = []
+    for load in loads:
+        vector = continuum.load_vector(load)
+        good = np.all(np.isfinite(vector.array_r))
+        bad = f"load '{load.title}' is not a finite number everywhere; mend its value"
+        raise_on_all_ranks(continuum.comm, None if good else bad)
+        vector.scale(-1.0)
+        out.append(vector)
+    for monitor in monitors:
+        if len(monitor.direction) != continuum.gdim:
+            raise InputError(
+                f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
+                f"{continuum.gdim} are needed"
+            )
+        nodes = continuum.owned_nodes(monitor.where)
+        count = continuum.comm.allreduce(len(nodes))
+        vector = PETSc.Vec().createMPI((continuum.n_local, continuum.n_global), comm=continuum.comm)
+        for i, component in enumerate(monitor.direction):
+            vector.array[continuum.gdim * nodes + i] = component / count
+        out.append(vector)
+    for mine in followed:
+        count = continuum.comm.allreduce(len(mine))
+        for i in range(continuum.gdim):
+            size = (continuum.n_local, continuum.n_global)
+            vector = PETSc.Vec().createMPI(size, comm=continuum.comm)
+            vector.array[continuum.gdim * mine + i] = 1.0 / count
+            out.append(vector)
+    return out
+
+
+class BorderedMatrix:
+    """A = T^t K T with its borders; collective.
+
+    Args:
+        stiffness: K; stays with the caller.
+        coordinates: T and its numbering.
+        borders: From :func:`load_and_monitor_vectors`; stay with the caller.
+        renewable: Whether K changes later on; memory for that is kept then.
+
+    Attributes:
+        matrix: The matrix.
+        on_window: What each border holds in the window rows (for a force pattern minus the load on
+            the slave face), shape (n_retained, n_borders), on every rank.
+    """
+
+    def __init__(
+        self,
+        stiffness: PETSc.Mat,
+        coordinates: JumpCoordinates,
+        borders: list[PETSc.Vec],
+        *,
+        renewable: bool = False,
+    ) -> None:
+        self._transform = coordinates.transform
+        self._inner: PETSc.Mat | None = None  # without borders, where that is another matrix
+        self._where: Ints = np.zeros(0, dtype=np.int64)  # its entries among those of the whole
+        inner = stiffness.ptap(coordinates.transform)
+        self.on_window = np.zeros((coordinates.n_retained, len(borders)))
+        if not borders:
+            self.matrix = inner
+            return
+        comm = compat.plain_comm(inner.getComm().tompi4py())
+        shape, _ = inner.getSizes()
+        indptr, indices, data = inner.getValuesCSR()
+        parts: list[Any] = [sp.csr_matrix((data, indices, indptr), shape=shape)]
+        parts += self._border_parts(inner, coordinates, borders, comm)
+        comm.Bcast(self.on_window)
+        if renewable:  # zeros are stored as well: they may not be zero next time
+            coo = [part.tocoo() for part in parts]
+            row, col, value = (
+                np.concatenate([getattr(c, name) for c in coo]) for name in ("row", "col", "data")
+            )
+            total = sp.coo_matrix((value, (row, col)), shape=shape).tocsr()
+        else:
+            total = sum(parts[1:], parts[0])
+        total.sort_indices()
+        structure = tuple(x.astype(PETSc.IntType) for x in (total.indptr, total.indices))
+        self.matrix = PETSc.Mat().createAIJ(
+            (shape, shape), csr=(*structure, total.data), comm=stiffness.getComm()
+        )
+        self.matrix.assemble()
+        if not renewable:
+            inner.destroy()
+            return
+        self._inner, self._structure = inner, structure
+        own, all_ = (
+            np.repeat(np.arange(shape[0], dtype=np.int64), np.diff(p)) * shape[1] + i
+            for p, i in ((indptr, indices), (total.indptr, total.indices))
+        )
+        self._where = np.searchsorted(all_, own)
+        self._borders = total.data
+        self._borders[self._where] -= data  # the borders alone are left
+
+    def _border_parts(
+        self,
+        inner: PETSc.Mat,
+        coordinates: JumpCoordinates,
+        borders: list[PETSc.Vec],
+        comm: MPI.Intracomm,
+    ) -> list[Any]:
+        """This rank's rows and columns of every border."""
+        shape, _ = inner.getSizes()
+        first = coordinates.first + coordinates.n_retained + coordinates.n_supports
+        start, _ = inner.getOwnershipRange()
+        right, parts = inner.createVecRight(), []
+        for i, border in enumerate(borders):
+            coordinates.transform.multTranspose(border, right)
+            if comm.rank == 0:
+                window = slice(coordinates.n_inner, coordinates.n_inner + coordinates.n_retained)
+                self.on_window[:, i] = right.array[window]
+            local = np.flatnonzero(right.array)
+            values = right.array[local]
+            parts.append(
+                sp.csr_matrix((values, (local, np.full(len(local), first + i))), shape=shape)
+            )
+            found: Any = comm.gather((local + start, values))
+            if comm.rank == 0:
+                columns, entries = (np.concatenate(p) for p in zip(*found, strict=True))
+                # a stored diagonal, however small: without one the symmetric conversion goes wrong
+                columns = np.append(columns, first + i)
+                entries = np.append(entries, 1e-300)
+                row = np.full(len(columns), first + i)
+                parts.append(sp.csr_matrix((entries, (row, columns)), shape=shape))
+        right.destroy()
+        return parts
+
+    def renew(self, stiffness: PETSc.Mat) -> None:
+        """Take another K with the same nonzero pattern; collective."""
+        if self._inner is None:
+            stiffness.ptap(self._transform, result=self.matrix)
+            return
+        stiffness.ptap(self._transform, result=self._inner)
+        data = self._borders.copy()
+        data[self._where] += self._inner.getValuesCSR()[2]
+        self.matrix.setValuesCSR(*self._structure, data)
+        self.matrix.assemble()
+
+    def destroy(self) -> None:
+        """Free the matrices; collective."""
+        self.matrix.destroy()
+        if self._inner is not None:
+            self._inner.destroy()

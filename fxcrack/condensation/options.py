@@ -1,0 +1,42 @@
+"""How the bodies are condensed onto their interfaces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fxcrack.base.errors import InputError
+
+METHODS = ("auto", "schur", "columns", "iterative")
+
+
+@dataclass(frozen=True)
+class CondensedOptions:
+    """How the condensation is done.
+
+    Args:
+        method: "schur", "columns" (both factor the bodies, see :class:`Condensation`), "iterative"
+            (columns by conjugate gradients with multigrid, no factorisation: for 3-D models too
+            large for one) or "auto": "schur" where it is available, "iterative" where the factors
+            of a 3-D model would not fit the memory of the machine.
+        window_mb: Memory the dense matrices of the window may take, and the stored columns of
+            "iterative" before old ones are dropped, MB.
+        rows: Force the window to reach at most this distance ahead of the front (length);
+            ``None`` lets the cost model decide.
+        rtol: "iterative" only: energy norm of a column's error over that of the column. The error
+            of S is its square.
+
+    Raises:
+        InputError: The method is unknown or the tolerance makes no sense.
+    """
+
+    method: str = "auto"
+    window_mb: float = 2000.0
+    rows: float | None = None
+    rtol: float = 1e-6
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            names = ", ".join(f"'{m}'" for m in METHODS)
+            raise InputError(f"method = '{self.method}': choose one of {names}")
+        if not 1e-12 <= self.rtol <= 1e-2:
+            raise InputError(f"rtol = {self.rtol}: choose a tolerance from 1e-12 to 1e-2")

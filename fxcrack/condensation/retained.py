@@ -1,0 +1,214 @@
+"""Which jump components take part in the condensation, and when to factor again.
+
+Ahead of the front the window holds the bonded nodes the crack may reach before the next rebase;
+behind it, the wake the criterion looks at; with contact, all open normals, and with friction all
+open components of interfaces with contact. How far it reaches is the number of nodes k that costs
+least. With a factorisation per window:
+ceil(L/k) (t_plain + c n(k)^2), L nodes to go, n window components, c the cost of an entry of S.
+With columns by iteration, each computed once: (L/k) t_window + t_column (n(k) - n(0))/2, the last
+window being half used on average. The constants are refitted from what was measured last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial import cKDTree
+
+from fxcrack.base.arrays import Bools
+from fxcrack.base.errors import InputError
+from fxcrack.interface.front import Front
+from fxcrack.interface.jump_coordinates import FIXED, FREE, RETAINED
+from fxcrack.interface.pairing import Pair
+
+WAKE_ROWS = 2
+"""Rows of open nodes behind the front that stay in the window."""
+
+
+@dataclass
+class CostModel:
+    """Seconds of a factorisation with n window components: t_plain + c n^2.
+
+    The constants start from `fxcrack bench` on one core (2-D, 211,332 dofs: 0.92 s plain and
+    0.97 s with 972 components; 3-D, 126,630 dofs: 2.9 s and 8.1 s with 4,599) and are refitted by
+    :meth:`observe`.
+
+    Attributes:
+        plain: Seconds of the plain factorisation.
+        per_entry: Seconds per entry of S.
+    """
+
+    plain: float
+    per_entry: float
+
+    @classmethod
+    def guess(cls, n_dofs: int, gdim: int) -> CostModel:
+        """Constants before anything was measured."""
+        if gdim == 2:
+            return cls(plain=4.5e-6 * n_dofs, per_entry=5e-8)
+        return cls(plain=9e-9 * float(n_dofs) ** (5.0 / 3.0), per_entry=2.5e-7)
+
+    def observe(self, n_retained: int, seconds: float) -> None:
+        """Scale both constants so that they give the measured time."""
+        ratio = seconds / (self.plain + self.per_entry * n_retained**2)
+        self.plain *= ratio
+        self.per_entry *= ratio
+
+    def reach(self, counts: npt.NDArray[np.int64]) -> int:
+        """Best number of candidate nodes to take.
+
+        Args:
+            counts: Cumulative number of window components after each candidate node,
+                nearest first, shape (n_candidates,).
+
+        Returns:
+            How many candidates, at least 1 if there is one.
+        """
+        if not len(counts):
+            return 0
+        times = np.ceil(len(counts) / np.arange(1, len(counts) + 1))
+        seconds = (self.plain + self.per_entry * counts.astype(float) ** 2) * times
+        return int(np.argmin(seconds)) + 1
+
+
+@dataclass
+class ColumnCost:
+    """Seconds where columns of S are computed by iteration, each once.
+
+    The constants start from 3-D problems of `fxcrack bench scale` on one core and are replaced by
+    :meth:`observe`.
+
+    Attributes:
+        column: Seconds of a column.
+        window: Seconds of a new window without columns.
+    """
+
+    column: float
+    window: float
+
+    @classmethod
+    def guess(cls, n_dofs: int) -> ColumnCost:
+        """Constants before anything was measured."""
+        return cls(column=2e-6 * n_dofs, window=0.02)
+
+    def observe(self, n_columns: int, column_seconds: float, seconds: float) -> None:
+        """Take over measured times.
+
+        Args:
+            n_columns: Columns computed for the last window.
+            column_seconds: Seconds they took.
+            seconds: Seconds of the window in all.
+        """
+        if n_columns:
+            self.column = column_seconds / n_columns
+        self.window = max(seconds - column_seconds, 1e-4)
+
+    def reach(self, counts: npt.NDArray[np.int64]) -> int:
+        """Best number of candidate nodes to take; see :meth:`CostModel.reach`."""
+        if not len(counts):
+            return 0
+        k = np.arange(1, len(counts) + 1)
+        wasted = 0.5 * self.column * (counts - counts[0]).astype(float)
+        return int(np.argmin(self.window * len(counts) / k + wasted)) + 1
+
+
+def choose_roles(
+    pairs: list[Pair],
+    fronts: list[Front],
+    active: list[bool],
+    reach: list[float],
+    cost: CostModel | ColumnCost,
+    *,
+    around: list[tuple[float, float]] | None = None,
+    keep: Sequence[tuple[int, int]] = (),
+    cap_mb: float,
+    gdim: int,
+) -> list[npt.NDArray[np.int8]]:
+    """Roles of all jump components for the next factorisation.
+
+    Args:
+        pairs: Interfaces.
+        fronts: Their present fronts.
+        active: Whether the crack may grow in each.
+        reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
+        cost: Cost model.
+        around: Distances ahead of and behind the tips that the criterion looks at, per pair.
+        keep: (pair, slave node) of bonds that are letting go and must stay in the window.
+        cap_mb: Memory S may take, MB.
+        gdim: Dimension.
+
+    Raises:
+        InputError: Even the smallest useful window exceeds the cap.
+    """
+    roles, waiting = [], []
+    friction = any(pair.friction is not None for pair in pairs)
+    n_fixed = 0
+    for p, (pair, front, on, far) in enumerate(zip(pairs, fronts, active, reach, strict=True)):
+        ahead, behind = (0.0, 0.0) if around is None else around[p]
+        role = np.full((pair.surface.n_nodes, gdim), FREE, dtype=np.int8)
+        bonded = front.bonded & pair.paired
+        role[bonded, 0] = FIXED
+        if not pair.interface.normal_only:
+            role[bonded] = FIXED
+        is_open = ~front.bonded & pair.paired
+        if pair.interface.contact:
+            role[is_open, 0] = RETAINED
+            if friction:
+                role[is_open] = RETAINED
+        if on and is_open.any() and bonded.any():
+            x = pair.surface.x
+            tips = front.candidates()
+            wake = _rings(front, tips, WAKE_ROWS * front.surface.order)
+            distance, _ = cKDTree(x[tips] if len(tips) else x[is_open]).query(x)
+            margin = 2.0 * front.surface.facet_size
+            if behind > 0.0:
+                wake |= distance <= behind + margin
+            role[wake & is_open] = RETAINED
+            near = _rings(front, tips, 2 * front.surface.order) & bonded
+            if ahead > 0.0:
+                near |= bonded & (distance <= ahead + margin)
+                far = far + ahead + margin
+            role[near] = _window_of(pair, role[near])
+            rest = np.flatnonzero(bonded & ~near & (distance <= far))
+            rest = rest[np.lexsort((rest, distance[rest]))]
+            waiting += [(float(distance[i]), p, int(i)) for i in rest]
+        for which, node in keep:
+            if which == p:
+                role[node] = RETAINED
+        roles.append(role)
+        n_fixed += int((role == RETAINED).sum())
+    waiting.sort()
+    per_node = [1 if pair.interface.normal_only else gdim for pair in pairs]
+    counts = n_fixed + np.cumsum([per_node[p] for _, p, _ in waiting], dtype=np.int64)
+    most = int(np.sqrt(cap_mb * 1e6 / 8.0 / 2.0))
+    if n_fixed > most:
+        raise InputError(
+            f"the window needs {n_fixed} jump components at least, whose dense matrices exceed "
+            f"the cap of {cap_mb:.0f} MB; raise window_mb, or coarsen the interface"
+        )
+    fits = counts[counts <= most]
+    for _, p, i in waiting[: min(cost.reach(counts), len(fits))]:
+        roles[p][i] = _window_of(pairs[p], roles[p][i])
+    return roles
+
+
+def _window_of(pair: Pair, role: npt.NDArray[np.int8]) -> npt.NDArray[np.int8]:
+    """Roles of bonded nodes once they are in the window."""
+    out = np.full_like(role, RETAINED)
+    if pair.interface.normal_only:
+        out[..., 1:] = FREE
+    return out
+
+
+def _rings(front: Front, start: npt.NDArray[np.int64], n: int) -> Bools:
+    """Nodes at most n facets away from the start nodes."""
+    inside = np.zeros(front.surface.n_nodes, dtype=bool)
+    inside[start] = True
+    facets = front.surface.facets
+    for _ in range(n):
+        touched = inside[facets].any(axis=1)
+        inside[facets[touched].ravel()] = True
+    return inside

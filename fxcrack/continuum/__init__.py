@@ -1,0 +1,1 @@
+"""The bodies: materials, kinematics, loads, effects, and the forms made of them."""

@@ -1,0 +1,348 @@
+"""The linear elastic continuum: displacement space, stiffness, load vectors, stress.
+
+    K u = sum_i lambda_i(t) f_i,      K = int  strain(v)^T C strain(u)  w dV
+
+with the weight w of the kinematic model. No boundary condition is applied here: supports become
+columns of the coordinate transformation (:mod:`fxcrack.interface.jump_coordinates`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
+import basix
+import basix.ufl
+import dolfinx.fem.petsc
+import dolfinx.mesh
+import numpy as np
+import numpy.typing as npt
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.continuum.kinematics import Axisymmetric, Model
+from fxcrack.continuum.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
+from fxcrack.continuum.materials import Material
+from fxcrack.mesh import Mesh
+
+if TYPE_CHECKING:
+    from fxcrack.continuum.temperature import Temperature
+    from fxcrack.continuum.thermal_strain import TemperatureField, ThermalLoad
+
+Ints = npt.NDArray[np.int32]
+
+
+class Continuum:
+    """Elastic bodies on one mesh.
+
+    Args:
+        mesh: Mesh with named groups.
+        materials: One material, or a material per cell group covering every cell once.
+        model: Kinematic model.
+        order: Polynomial order of the displacement, 1 or 2; the order of the mesh by default.
+        temperature: Temperature of the bodies; ``None`` for none.
+
+    Attributes:
+        space: Displacement space.
+        x: UFL position.
+        weight: UFL factor of area and volume elements (thickness, ring, 1).
+        degree: Quadrature degree of all integrals.
+        parts: Stiffness on the model's strains, all stresses per strain, and measure, per material.
+        part_materials: The material of each part.
+        part_cells: Owned cells of each part.
+        temperature: The temperature on this mesh, ``None`` where there is none.
+
+    Raises:
+        InputError: The model does not fit the mesh, or the materials do not cover it once.
+    """
+
+    def __init__(
+        self,
+        mesh: Mesh,
+        materials: Material | Mapping[str, Material],
+        model: Model,
+        *,
+        order: int | None = None,
+        temperature: Temperature | None = None,
+    ) -> None:
+        if model.gdim != mesh.gdim:
+            raise InputError(
+                f"{type(model).__name__} needs a mesh of dimension {model.gdim}, "
+                f"but mesh '{mesh.name}' has dimension {mesh.gdim}"
+            )
+        if isinstance(model, Axisymmetric):
+            r = mesh.domain.geometry.x[:, 0]
+            inside = float(r.min(initial=0.0)) < -1e-9 * float(np.abs(r).max(initial=0.0))
+            raise_on_all_ranks(
+                mesh.comm,
+                f"Axisymmetric: mesh '{mesh.name}' has nodes at radius x = {r.min():g}; model one "
+                "half-section with x >= 0, the axis at x = 0"
+                if inside
+                else None,
+            )
+        self.mesh = mesh
+        self.model = model
+        self.order = mesh.order if order is None else order
+        if self.order not in (1, 2):
+            raise InputError(f"order = {self.order}: only displacements of order 1 and 2 exist")
+        self.comm = mesh.comm
+        self.gdim = mesh.gdim
+        self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (self.gdim,)))
+        index_map = self.space.dofmap.index_map
+        self.n_local = int(index_map.size_local) * self.gdim
+        self.n_global = int(index_map.size_global) * self.gdim
+        self.offset = int(index_map.local_range[0]) * self.gdim
+        self.x = ufl.SpatialCoordinate(mesh.domain)
+        weight = model.weight(self.x)
+        self.weight = (
+            fem.Constant(mesh.domain, PETSc.ScalarType(weight))
+            if isinstance(weight, float)
+            else weight
+        )
+        self.degree = 2 * self.order + (1 if "Axisymmetric" in type(model).__name__ else 0)
+        self.temperature: TemperatureField | None = None
+        if temperature is not None:
+            from fxcrack.continuum.thermal_strain import TemperatureField
+
+            self.temperature = TemperatureField(mesh.domain, self.order, temperature)
+        listed = materials.values() if isinstance(materials, Mapping) else [materials]
+        for material in listed:
+            if isinstance(material, type) or not hasattr(material, "stiffness"):
+                raise InputError(
+                    f"materials: {material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
+                    "nu=0.3), or one per cell group, {'name': Isotropic(...)}"
+                )
+        self.part_materials: list[Material] = []
+        self.part_cells: list[Ints] = []
+        self.parts = self._assign(materials)
+        self._form: Any = None
+
+    def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any, Any]]:
+        """Stiffness, stress per strain and measure, one triple per material."""
+        domain, meta = self.mesh.domain, {"quadrature_degree": self.degree}
+        if not isinstance(materials, Mapping):
+            self.part_materials = [materials]
+            n = domain.topology.index_map(self.mesh.tdim).size_local
+            self.part_cells = [np.arange(n, dtype=np.int32)]
+            return [(*self._moduli(0), ufl.dx(domain, metadata=meta))]
+        n_cells = domain.topology.index_map(self.mesh.tdim).size_local
+        count = np.zeros(n_cells, dtype=np.int32)
+        cells, values = [], []
+        for i, name in enumerate(materials):
+            group = self.mesh.group(name, dim=self.mesh.tdim).entities
+            cells.append(group)
+            values.append(np.full(len(group), i + 1, dtype=np.int32))
+            count[group[group < n_cells]] += 1
+        bad = None
+        if np.any(count != 1):
+            named = {n for n, g in self.mesh.groups.items() if g.dim == self.mesh.tdim}
+            bad = (
+                f"materials cover {np.sum(count == 0)} cells of this rank not at all and "
+                f"{np.sum(count > 1)} more than once; name every cell group exactly once "
+                f"(given: {', '.join(materials)}; not given: "
+                f"{', '.join(sorted(named - set(materials))) or 'none'})"
+            )
+        raise_on_all_ranks(self.comm, bad)
+        self.part_materials = list(materials.values())
+        self.part_cells = [c[c < n_cells] for c in cells]
+        entities, tags = np.concatenate(cells), np.concatenate(values)
+        sort = np.argsort(entities)
+        marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])
+        dx = ufl.Measure("dx", domain=domain, subdomain_data=marks, metadata=meta)
+        return [(*self._moduli(i), dx(i + 1)) for i in range(len(materials))]
+
+    def _moduli(self, i: int) -> tuple[Any, Any]:
+        """Stiffness on the strains of the model, and all its stresses per unit strain."""
+        material, model = self.part_materials[i], self.model
+        if self.temperature is not None and hasattr(material, "temperatures"):
+            from fxcrack.continuum.thermal_strain import interpolated
+
+            return (
+                interpolated(self, i, lambda m: model.reduce(m.stiffness())),
+                interpolated(self, i, lambda m: model.recover(m.stiffness())),
+            )
+        domain, c = self.mesh.domain, material.stiffness()
+        return (
+            fem.Constant(domain, self.model.reduce(c)),
+            fem.Constant(domain, self.model.recover(c)),
+        )
+
+    def compile(self) -> None:
+        """Compile the stiffness form (cached on disk by DOLFINx); assembly does it otherwise."""
+        if self._form is None:
+            u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
+            eu, ev = self.model.strain(u, self.x), self.model.strain(v, self.x)
+            self._form = fem.form(
+                sum(ufl.inner(ufl.dot(c, eu), ev) * self.weight * dx for c, _, dx in self.parts)
+            )
+
+    def stiffness(self) -> PETSc.Mat:
+        """Assemble K, shape (n_global, n_global); the caller destroys it."""
+        self.compile()
+        matrix = dolfinx.fem.petsc.assemble_matrix(self._form)
+        matrix.assemble()
+        return matrix
+
+    def load_vector(self, load: Load | ThermalLoad) -> PETSc.Vec:
+        """Nodal forces of a load at amplitude 1; the caller destroys the vector."""
+        v = ufl.TestFunction(self.space)
+        if isinstance(load, Traction):
+            ds = self.surface(load.where)
+            form = ufl.inner(self._vector(load.value, load.title), v) * self.weight * ds
+        elif isinstance(load, Pressure):
+            ds = self.surface(load.where)
+            normal = ufl.FacetNormal(self.mesh.domain)
+            form = -ufl.inner(self.field(load.value) * normal, v) * self.weight * ds
+        elif isinstance(load, BodyForce):
+            value = self._vector(load.value, load.title)
+            form = ufl.inner(value, v) * self.weight * self.volume(load.where)
+        elif not isinstance(load, PointForce):
+            from fxcrack.continuum.thermal_strain import load_form
+
+            form = load_form(self, load, v)
+        else:
+            return self._point_force(load.where, load.value, load.title)
+        vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
+        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        return vector
+
+    def surface(self, where: str) -> Any:
+        """UFL measure of a named facet group."""
+        meta = {"quadrature_degree": self.degree}
+        facets = self.mesh.group(where, dim=self.mesh.tdim - 1).entities
+        marks = dolfinx.mesh.meshtags(
+            self.mesh.domain, self.mesh.tdim - 1, facets, np.ones(len(facets), dtype=np.int32)
+        )
+        return ufl.Measure("ds", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
+
+    def volume(self, where: str | None) -> Any:
+        """UFL measure of a named cell group, of the whole mesh for ``None``."""
+        meta = {"quadrature_degree": self.degree}
+        if where is None:
+            return ufl.dx(self.mesh.domain, metadata=meta)
+        cells = self.mesh.group(where, dim=self.mesh.tdim).entities
+        marks = dolfinx.mesh.meshtags(
+            self.mesh.domain, self.mesh.tdim, cells, np.ones(len(cells), dtype=np.int32)
+        )
+        return ufl.Measure("dx", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
+
+    def field(self, value: Field) -> Any:
+        """A number as a UFL constant, a function of positions interpolated in each cell."""
+        if not callable(value):
+            return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
+        # points inside the cells: a step at a cell boundary stays a step
+        element = basix.ufl.element(
+            "DG",
+            self.mesh.domain.basix_cell(),
+            self.order,
+            lagrange_variant=basix.LagrangeVariant.legendre,
+        )
+        function = fem.Function(fem.functionspace(self.mesh.domain, element))
+        if isinstance(value, fem.Function):
+            function.interpolate(value)
+            return function
+
+        def at(x: Array) -> Array:
+            found = np.asarray(value(x), dtype=PETSc.ScalarType)
+            if found.shape not in ((), (x.shape[1],), (1, x.shape[1])):
+                raise InputError(
+                    f"a function of position of a load gives shape {found.shape} at {x.shape[1]} "
+                    "positions x of shape (3, n); return one number per position, shape (n,)"
+                )
+            return np.array(np.broadcast_to(found, (1, x.shape[1]))[0])
+
+        function.interpolate(at)
+        return function
+
+    def _check_components(self, value: tuple[Field, ...], title: str) -> None:
+        given = len(value) if hasattr(value, "__len__") else "no list of"
+        if given != self.gdim:
+            raise InputError(f"load '{title}': {given} components given, {self.gdim} needed")
+
+    def _vector(self, value: tuple[Field, ...], title: str) -> Any:
+        self._check_components(value, title)
+        return ufl.as_vector([self.field(v) for v in value])
+
+    def _point_force(self, where: str, value: tuple[float, ...], title: str) -> PETSc.Vec:
+        self._check_components(value, title)
+        nodes = self.owned_nodes(where)
+        count = self.comm.allreduce(len(nodes))
+        vector = PETSc.Vec().createMPI((self.n_local, self.n_global), comm=self.comm)
+        for i, component in enumerate(value):
+            vector.array[self.gdim * nodes + i] = component / count
+        return vector
+
+    def owned_nodes(self, where: str) -> Ints:
+        """Displacement nodes of a group that this rank owns (local block indices); collective.
+
+        Raises:
+            InputError: No rank finds a node in the group.
+        """
+        group = self.mesh.group(where)
+        self.mesh.domain.topology.create_connectivity(group.dim, self.mesh.tdim)
+        nodes = fem.locate_dofs_topological(self.space, group.dim, group.entities)
+        nodes = np.unique(nodes[nodes < self.n_local // self.gdim])
+        if self.comm.allreduce(len(nodes)) == 0:
+            raise InputError(f"group '{where}' of mesh '{self.mesh.name}' holds no node")
+        return np.asarray(nodes, dtype=np.int32)
+
+    def positions(self) -> Array:
+        """Positions of the local displacement nodes, owned first, shape (n, 3), length."""
+        return np.asarray(self.space.tabulate_dof_coordinates())
+
+    def stress(self, u: fem.Function) -> fem.Function:
+        """Cell averages of the stress, components in the order of ``model.stress_labels``.
+
+        That of the small strain, at the present temperature (``temperature.set(time)``).
+        """
+        strain = self.model.strain(u, self.x)
+        return self.cell_means(
+            [(self.small_stress(i, strain), self.parts[i][2]) for i in range(len(self.parts))]
+        )
+
+    def cell_means(self, stresses: list[tuple[Any, Any]]) -> fem.Function:
+        """Cell averages of UFL stresses, one with its measure per part; collective."""
+        n = len(self.model.stress_labels)
+        element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
+        space = fem.functionspace(self.mesh.domain, element)
+        test = ufl.TestFunction(space)
+        volume = dolfinx.fem.petsc.assemble_vector(
+            fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self.weight * ufl.dx)
+        )
+        sigma = sum(ufl.inner(stress, test) * self.weight * dx for stress, dx in stresses)
+        integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
+        out = fem.Function(space, name="stress")
+        local = len(volume.array)
+        out.x.array[:local] = integral.array / volume.array
+        out.x.scatter_forward()
+        volume.destroy()
+        integral.destroy()
+        return out
+
+    def small_stress(self, i: int, strain: Any) -> Any:
+        """All stresses (``model.stress_labels``) of a part at a small strain, UFL."""
+        if self.temperature is None:
+            return ufl.dot(self.parts[i][1], strain)
+        from fxcrack.continuum.thermal_strain import whole_stress
+
+        return whole_stress(self, i, strain)
+
+    def von_mises(self, stress: fem.Function) -> fem.Function:
+        """Von Mises stress per cell, of the cell averages of the stress."""
+        labels = self.model.stress_labels
+        s = stress.x.array.reshape(-1, len(labels))
+        a, b, c = s[:, :3].T  # the normal stresses come first in every model
+        shears = s[:, 3:].T
+        space = fem.functionspace(self.mesh.domain, ("DG", 0))
+        out = fem.Function(space, name="von_mises")
+        out.x.array[:] = np.sqrt(
+            0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) + 3.0 * sum(t**2 for t in shears)
+        )
+        return out
+
+
+__all__ = ["Continuum", "compat"]

@@ -1,0 +1,69 @@
+"""Elastic bodies: W = 1/2 int (e - e_th) : C : (e - e_th) w dV, for small or finite strain.
+
+With e the small strain the term is linear; with e the Green-Lagrange strain it is the
+St. Venant-Kirchhoff material, for isotropic and orthotropic stiffness alike. The thermal strain of
+the latter is that of the stretch 1 + expansion (T - T_ref): e_th = A + A^2/2.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import ufl
+from dolfinx import fem
+
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.kinematics import deformation_gradient, green_lagrange, labelled, tensor
+from fxcrack.continuum.term import StoringTerm
+
+
+class Elastic(StoringTerm):
+    """Elastic bodies of a continuum: all parts whose material names no other form.
+
+    Args:
+        continuum: Materials, model, measures and temperature.
+        finite: Green-Lagrange strain instead of the small one.
+    """
+
+    def __init__(self, continuum: Continuum, *, finite: bool = False) -> None:
+        super().__init__(continuum, "elastic")
+        self.finite = finite
+        self.name = "finite strain" if finite else "elasticity"
+        self.constant = not finite
+
+    def energy(self, u: fem.Function) -> Any:
+        """Strain energy."""
+        c = self._continuum
+        strain = green_lagrange(c.model, u, c.x) if self.finite else c.model.strain(u, c.x)
+        total = 0
+        for i in self._parts:
+            stiffness, _, dx = c.parts[i]
+            e = strain
+            if c.temperature is not None:
+                from fxcrack.continuum import thermal_strain as thermal
+
+                rise = c.temperature.rise
+                stiffness = thermal.whole_stiffness(c, i)
+                e = thermal.whole(c.model, strain) - rise * thermal.expansion(c, i)
+                if self.finite:
+                    e -= rise**2 / 2 * thermal.square_expansion(c, i)
+            total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
+        return total
+
+    def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
+        """Cauchy stress; of a finite strain F S F^t/J.
+
+        The sheet of plane stress is taken as thick as it was, which is right to the order of the
+        strain.
+        """
+        c = self._continuum
+        small = c.model.strain(u, c.x)
+        if not self.finite:
+            return [(c.small_stress(i, small), c.parts[i][2]) for i in self._parts]
+        f = deformation_gradient(c.model, u, c.x)
+        out = []
+        for i in self._parts:
+            strain = green_lagrange(c.model, u, c.x)
+            second = tensor(c.model, c.small_stress(i, strain))
+            out.append((labelled(c.model, f * second * f.T / ufl.det(f)), c.parts[i][2]))
+        return out

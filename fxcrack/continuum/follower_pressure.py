@@ -1,0 +1,107 @@
+"""Pressure that stays normal to the deformed surface: the traction is -p n on the deformed area.
+
+    r(u; v) = int  p  J F^-t N . v  w dA,    N and dA undeformed
+
+Its tangent is not symmetric. The sheet of plane stress keeps its thickness.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.input_order import Place
+from fxcrack.continuum.kinematics import Axisymmetric, cofactor
+from fxcrack.continuum.loads import Pressure
+from fxcrack.continuum.term import Term
+
+
+class FollowerPressure(Term):
+    """A pressure that follows the body.
+
+    Args:
+        continuum: Displacement space, model and groups.
+        load: Where, how much, when.
+    """
+
+    symmetric = False
+
+    def __init__(self, continuum: Continuum, load: Pressure) -> None:
+        self.name = f"follower pressure '{load.title}'"
+        self._continuum = continuum
+        self._load = load
+        domain = continuum.mesh.domain
+        self._ds = continuum.surface(load.where)
+        self._value = continuum.field(load.value)
+        self._factor = fem.Constant(domain, PETSc.ScalarType(0.0))
+        self._last_factor = 0.0
+        self._last = np.zeros_like(fem.Function(continuum.space).x.array)
+        self._work = 0.0
+        self._power: tuple[Any, Any, Any, Any] | None = None
+
+    def residual(self, u: fem.Function, v: Any) -> Any:
+        """Minus the forces of the pressure."""
+        return self._form(self._factor, u, v)
+
+    def _form(self, factor: Any, u: Any, v: Any) -> Any:
+        c = self._continuum
+        normal = ufl.FacetNormal(c.mesh.domain)
+        area = cofactor(ufl.Identity(c.gdim) + ufl.grad(u)) * normal
+        if isinstance(c.model, Axisymmetric):
+            area = (1 + u[0] / c.x[0]) * area
+        return factor * self._value * ufl.inner(area, v) * c.weight * self._ds
+
+    def begin(self, time: float, dt: float) -> None:
+        """Set the pressure at the end of the increment."""
+        self._factor.value = self._load.amplitude(time)
+
+    def path_work(self, u: fem.Function) -> float:
+        """Work along the straight way from the last state; exact, by Simpson's rule.
+
+        Force and displacement are linear on the way, the deformed area at most quadratic.
+        """
+        c = self._continuum
+        if self._power is None:
+            factor = fem.Constant(c.mesh.domain, PETSc.ScalarType(0.0))
+            at, step = fem.Function(c.space), fem.Function(c.space)
+            self._power = factor, at, step, fem.form(-self._form(factor, at, step))
+        factor, at, step, form = self._power
+        step.x.array[:] = u.x.array - self._last
+        now = float(self._factor.value)
+        work = 0.0
+        for place, weight in ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)):
+            factor.value = (1.0 - place) * self._last_factor + place * now
+            at.x.array[:] = self._last + place * step.x.array
+            work += weight * fem.assemble_scalar(form)
+        return float(c.comm.allreduce(work, op=MPI.SUM))
+
+    def commit(self, u: fem.Function) -> None:
+        """Add the work along the straight way from the last state."""
+        self._work += self.path_work(u)
+        self._last[:] = u.x.array
+        self._last_factor = float(self._factor.value)
+
+    def work(self) -> float:
+        """Work of the pressure up to the last commit; the same on all ranks."""
+        return self._work
+
+    def state(self) -> dict[str, Array]:
+        """Displacement and pressure of the last commit, work so far."""
+        return {"last": self._last.copy(), "sums": np.array([self._last_factor, self._work])}
+
+    def places(self) -> dict[str, Place]:
+        """Space of the displacement."""
+        return {"last": self._continuum.space}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state`."""
+        self._last[:] = state["last"]
+        self._last_factor, self._work = (float(x) for x in state["sums"])
+        self._factor.value = self._last_factor

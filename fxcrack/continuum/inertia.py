@@ -1,0 +1,338 @@
+"""What the user says about inertia: density, damping and the time integration.
+
+    M a_{n+1-alpha_m} + C v_{n+1-alpha_f} + f_{n+1-alpha_f} = 0        (generalised alpha)
+
+Chung and Hulbert (1993); Hilber, Hughes and Taylor's method and Newmark's are choices of the
+parameters. Pure data; :mod:`fxcrack.continuum.inertia` makes forms of it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import dolfinx.fem.petsc
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError, SolverError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.input_order import Place
+from fxcrack.continuum.loads import Field
+from fxcrack.continuum.term import Term
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Inertia of the bodies: implicit dynamics.
+
+    Args:
+        density: Mass per undeformed volume of all bodies; that of the materials by default.
+        rho_inf: What is left of a motion too fast for the increment after one increment, 0 to 1:
+            1 damps nothing, 0 damps it at once. The parameters follow from it.
+        alpha_m: Weight of the old acceleration, if chosen by hand (together with ``alpha_f``).
+        alpha_f: Weight of the old forces and velocity.
+        rayleigh: Damping C = r_M M + r_K K by mass (1/time) and by stiffness at zero strain (time).
+        lumped: Mass at the nodes alone; first-order bodies only.
+        velocity: Velocity at time 0, a number or a function of position per component; at rest by
+            default.
+
+    Raises:
+        InputError: A number is out of range, or the method would be unstable or of first order.
+    """
+
+    density: float | None = None
+    rho_inf: float = 0.8
+    alpha_m: float | None = None
+    alpha_f: float | None = None
+    rayleigh: tuple[float, float] = (0.0, 0.0)
+    lumped: bool = False
+    velocity: tuple[Field, ...] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if self.density is not None and not (np.isfinite(self.density) and self.density > 0.0):
+            raise InputError(f"Inertia: density = {self.density} must be positive")
+        if not 0.0 <= self.rho_inf <= 1.0:
+            raise InputError(f"Inertia: rho_inf = {self.rho_inf} must lie between 0 and 1")
+        if (self.alpha_m is None) != (self.alpha_f is None):
+            raise InputError("Inertia: give alpha_m and alpha_f together, or rho_inf alone")
+        if self.velocity is not None and not isinstance(self.velocity, tuple | list):
+            raise InputError(
+                f"Inertia: velocity = {self.velocity!r} must have one entry per component, each a "
+                "number or a function of position, e.g. (0.0, 1.0)"
+            )
+        m, f, _, _ = self.parameters
+        if not m <= f <= 0.5:
+            raise InputError(
+                f"Inertia: alpha_m = {m}, alpha_f = {f} is not unconditionally stable; "
+                "alpha_m <= alpha_f <= 1/2 is"
+            )
+        if len(self.rayleigh) != 2 or not all(np.isfinite(r) and r >= 0.0 for r in self.rayleigh):
+            raise InputError(
+                f"Inertia: rayleigh = {self.rayleigh} must be two numbers that are not negative"
+            )
+
+    @classmethod
+    def hht(cls, alpha: float = -0.05, **others: object) -> Inertia:
+        """Hilber, Hughes and Taylor's method, -1/3 <= alpha <= 0."""
+        if not -1.0 / 3.0 <= alpha <= 0.0:
+            raise InputError(f"Inertia.hht: alpha = {alpha} must lie between -1/3 and 0")
+        return cls(alpha_m=0.0, alpha_f=-alpha, **others)  # type: ignore[arg-type]
+
+    @classmethod
+    def newmark(cls, **others: object) -> Inertia:
+        """Newmark's method with constant mean acceleration: no numerical damping."""
+        return cls(alpha_m=0.0, alpha_f=0.0, **others)  # type: ignore[arg-type]
+
+    @property
+    def parameters(self) -> tuple[float, float, float, float]:
+        """Alpha_m, alpha_f, beta, gamma; second order in the increment."""
+        if self.alpha_m is not None and self.alpha_f is not None:
+            m, f = self.alpha_m, self.alpha_f
+        else:
+            m = (2.0 * self.rho_inf - 1.0) / (self.rho_inf + 1.0)
+            f = self.rho_inf / (self.rho_inf + 1.0)
+        return m, f, 0.25 * (1.0 - m + f) ** 2, 0.5 - m + f
+
+
+REMEMBERED = ("u", "v", "a", "b", "c")
+
+
+class InertiaForces(Term):
+    """Inertia and Rayleigh damping of all bodies.
+
+    The tangent is a constant while the length of the increments is.
+
+    Args:
+        continuum: Displacement space, materials and measures.
+        effect: Density, damping and method.
+
+    Attributes:
+        velocity: Velocity at the trial displacement.
+
+    Raises:
+        InputError: A part has no density, or lumped mass is asked of second-order bodies.
+    """
+
+    name = "inertia"
+    closed = False
+    constant = True
+    dynamic = True
+    energy_name = "kinetic_energy"
+
+    def __init__(self, continuum: Continuum, effect: Inertia) -> None:
+        if effect.lumped and continuum.order != 1:
+            raise InputError("Inertia: lumped mass exists for first-order bodies only (order=1)")
+        self._continuum = continuum
+        self._effect = effect
+        domain = continuum.mesh.domain
+        self._densities = [
+            fem.Constant(domain, PETSc.ScalarType(_density(effect, m)))
+            for m in continuum.part_materials
+        ]
+        self._by_mass, self._by_stiffness = (
+            fem.Constant(domain, PETSc.ScalarType(r)) for r in effect.rayleigh
+        )
+        self._damped = any(effect.rayleigh)
+        # b = b_u u + b_known, c likewise
+        self._b_u, self._c_u = (fem.Constant(domain, PETSc.ScalarType(0.0)) for _ in range(2))
+        self._b_known, self._c_known = (fem.Function(continuum.space) for _ in range(2))
+        self.velocity = fem.Function(continuum.space, name="velocity")
+        if effect.velocity is not None:
+            self._start(effect.velocity)
+        size = len(self.velocity.x.array)
+        self._last = {name: np.zeros(size) for name in REMEMBERED}
+        for name in ("v", "c"):
+            self._last[name] = self.velocity.x.array.copy()
+        if effect.velocity is not None and self._damped:
+            for name in ("a", "b"):
+                self._last[name] = self._slowing()
+        self._dt = 0.0
+        self._moving = False  # between the beginning of an increment and its commit
+        self._spent = {"numerical_dissipation": 0.0}
+        if self._damped:
+            self._spent["damping_energy"] = 0.0
+        self._products: Any = None
+
+    def _start(self, velocity: Any) -> None:
+        gdim = self._continuum.gdim
+        if len(velocity) != gdim:
+            raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
+        self.velocity.interpolate(
+            lambda x: np.stack(
+                [np.broadcast_to(v(x) if callable(v) else float(v), x.shape[1]) for v in velocity]
+            )
+        )
+
+    def _slowing(self) -> Array:
+        """First acceleration, M a = -C v, of a body without forces; collective."""
+        space = self._continuum.space
+        v, a = ufl.TestFunction(space), ufl.TrialFunction(space)
+        matrix = dolfinx.fem.petsc.assemble_matrix(fem.form(self._mass(a, v)))
+        matrix.assemble()
+        right = dolfinx.fem.petsc.assemble_vector(fem.form(-self._damping(self.velocity, v)))
+        right.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+        solver = PETSc.KSP().create(self._continuum.comm)
+        solver.setOperators(matrix)
+        solver.setType("cg")
+        solver.getPC().setType("jacobi")
+        solver.setTolerances(rtol=1e-12)
+        out = fem.Function(space)
+        solver.solve(right, out.x.petsc_vec)
+        out.x.scatter_forward()
+        for o in (solver, matrix, right):
+            o.destroy()
+        return np.asarray(out.x.array.copy())
+
+    def _mass(self, a: Any, v: Any) -> Any:
+        c = self._continuum
+        total = 0
+        for density, (_, _, dx) in zip(self._densities, c.parts, strict=True):
+            if self._effect.lumped:
+                dx = dx.reconstruct(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
+            total += density * ufl.inner(a, v) * c.weight * dx
+        return total
+
+    def _damping(self, velocity: Any, v: Any) -> Any:
+        c = self._continuum
+        ev, e = c.model.strain(v, c.x), c.model.strain(velocity, c.x)
+        total = self._by_mass * self._mass(velocity, v)
+        for stiffness, _, dx in c.parts:
+            total += self._by_stiffness * ufl.inner(ufl.dot(stiffness, e), ev) * c.weight * dx
+        return total
+
+    def energy(self, u: fem.Function) -> Any:
+        """Kinetic energy at the trial velocity."""
+        return 0.5 * self._mass(self.velocity, self.velocity)
+
+    def residual(self, u: fem.Function, v: Any) -> Any:
+        """M b + C c."""
+        total = self._mass(self._b_u * u + self._b_known, v)
+        if self._damped:
+            total += self._damping(self._c_u * u + self._c_known, v)
+        return total
+
+    def begin(self, time: float, dt: float) -> None:
+        """Prepare b(u) and c(u) for an increment."""
+        if not dt > 0.0:
+            raise SolverError(f"inertia: an increment of length {dt} is no motion; it must be > 0")
+        self._moving = True
+        alpha_m, alpha_f, _, gamma = self._effect.parameters
+        last, keep = self._last, 1.0 - alpha_f
+        self._take_dt(dt)
+        a = self._known_acceleration(last)
+        self._b_known.x.array[:] = (
+            (1.0 - alpha_m) * a + alpha_m * last["a"] - alpha_f * last["b"]
+        ) / keep
+        v = last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
+        self._c_known.x.array[:] = v + alpha_f * (last["v"] - last["c"]) / keep
+
+    def _take_dt(self, dt: float) -> None:
+        """Set b_u and c_u for increments of a length; 0 before the first one."""
+        if dt == self._dt:
+            return
+        alpha_m, alpha_f, beta, gamma = self._effect.parameters
+        self._dt = dt
+        self.version += 1
+        self._b_u.value = (1.0 - alpha_m) / (beta * dt**2 * (1.0 - alpha_f)) if dt > 0.0 else 0.0
+        self._c_u.value = gamma / (beta * dt) if dt > 0.0 else 0.0
+
+    def _known_acceleration(self, last: dict[str, Array]) -> Array:
+        """The part of the new acceleration that is not u/(beta dt^2)."""
+        beta, dt = self._effect.parameters[2], self._dt
+        known = -(last["u"] + dt * last["v"]) / (beta * dt**2)
+        return np.asarray(known - (0.5 / beta - 1.0) * last["a"])
+
+    def _motion(self, u: Array) -> tuple[Array, Array]:
+        """Acceleration and velocity at a new displacement."""
+        _, _, beta, gamma = self._effect.parameters
+        last, dt = self._last, self._dt
+        a = u / (beta * dt**2) + self._known_acceleration(last)
+        return a, last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
+
+    def update(self, u: fem.Function) -> None:
+        """Set the trial velocity."""
+        if self._moving:
+            self.velocity.x.array[:] = self._motion(u.x.array)[1]
+
+    def commit(self, u: fem.Function) -> None:
+        """Keep the motion; what the forces put in and is no kinetic energy was dissipated."""
+        if not self._moving:
+            return
+        self._moving = False
+        a, v = self._motion(u.x.array)
+        new = {
+            "u": u.x.array.copy(),
+            "v": v,
+            "a": a,
+            "b": float(self._b_u.value) * u.x.array + self._b_known.x.array,
+            "c": float(self._c_u.value) * u.x.array + self._c_known.x.array,
+        }
+        last = self._last
+        step = new["u"] - last["u"]
+        given = self._product("mass", 0.5 * (last["b"] + new["b"]), step)
+        gained = 0.5 * self._product("mass", v + last["v"], v - last["v"])
+        self._spent["numerical_dissipation"] += given - gained
+        if self._damped:
+            mean = 0.5 * (last["c"] + new["c"])
+            self._spent["damping_energy"] += self._product("damping", mean, step)
+        self._last = new
+        self.velocity.x.array[:] = v
+
+    def _product(self, name: str, x: Array, y: Array) -> float:
+        """Mass or damping matrix between two vectors; collective."""
+        if self._products is None:
+            left, right = (fem.Function(self._continuum.space) for _ in range(2))
+            forms = {"mass": fem.form(self._mass(left, right))}
+            if self._damped:
+                forms["damping"] = fem.form(self._damping(left, right))
+            self._products = left, right, forms
+        left, right, forms = self._products
+        left.x.array[:], right.x.array[:] = x, y
+        value = fem.assemble_scalar(forms[name])
+        return float(self._continuum.comm.allreduce(value, op=MPI.SUM))
+
+    def spent(self) -> dict[str, float]:
+        """Energy taken by Rayleigh damping and by the method up to the last commit.
+
+        With the work of all other forces by the trapezoidal rule the balance is exact:
+        work = kinetic energy + damping energy + numerical dissipation.
+        """
+        return dict(self._spent)
+
+    def state(self) -> dict[str, Array]:
+        """Motion of the last commit and sums."""
+        out = {name: value.copy() for name, value in self._last.items()}
+        return out | {"sums": np.array(list(self._spent.values())), "dt": np.array([self._dt])}
+
+    def places(self) -> dict[str, Place]:
+        """Space of the motion."""
+        return dict.fromkeys(REMEMBERED, self._continuum.space)
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state`, with the tangent of its last increment."""
+        self._last = {name: state[name].copy() for name in REMEMBERED}
+        self._spent = dict(zip(self._spent, (float(x) for x in state["sums"]), strict=True))
+        self._moving = False
+        self._take_dt(float(state["dt"][0]))
+        for known, name, factor in (
+            (self._b_known, "b", self._b_u),
+            (self._c_known, "c", self._c_u),
+        ):
+            known.x.array[:] = self._last[name] - float(factor.value) * self._last["u"]
+        self.velocity.x.array[:] = self._last["v"]
+
+
+def _density(effect: Inertia, material: Any) -> float:
+    density = getattr(material, "density", None) if effect.density is None else effect.density
+    if density is None:
+        raise InputError(
+            f"Inertia: {material} has no density; give Inertia(density=...) or density= in the "
+            "material"
+        )
+    return float(density)

@@ -1,0 +1,226 @@
+"""What acts on a body: supports, tractions, pressures, body forces, point forces, amplitudes.
+
+Every entry is a pattern in space times an amplitude in time; a scene may hold any number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
+
+Field = float | Callable[[Array], Array]
+"""A number, or a function of positions, shape (3, n), that returns shape (n,)."""
+
+
+@dataclass(frozen=True)
+class Amplitude:
+    """Piecewise linear factor in time, held constant outside the table.
+
+    Args:
+        times: Increasing times.
+        values: Factor at those times.
+    """
+
+    times: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        """Check the table."""
+        if len(self.times) != len(self.values) or not self.times:
+            raise InputError(
+                f"Amplitude: {len(self.times)} times but {len(self.values)} values; "
+                "give as many of one as of the other, at least one"
+            )
+        if not np.all(np.isfinite([*self.times, *self.values])):
+            raise InputError("Amplitude: times and values must be finite numbers")
+        if np.any(np.diff(self.times) <= 0.0):
+            raise InputError(f"Amplitude: times {self.times} must increase")
+
+    def __call__(self, time: float) -> float:
+        """Factor at a time."""
+        return float(np.interp(time, self.times, self.values))
+
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which the slope changes."""
+        return self.times
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """The factor is the time itself, without end: the default amplitude."""
+
+    def __call__(self, time: float) -> float:
+        """Factor at a time."""
+        return float(time)
+
+    def breaks(self) -> tuple[float, ...]:
+        """No change of slope."""
+        return ()
+
+
+def constant(value: float = 1.0) -> Amplitude:
+    """An amplitude that is there from the first moment and stays."""
+    return Amplitude((0.0,), (value,))
+
+
+AmplitudeLike = Amplitude | Ramp
+
+
+@dataclass(frozen=True)
+class Displacement:
+    """Prescribed displacement components on a named group, each with its reaction in the history.
+
+    Args:
+        where: Name of a group of nodes, edges, facets or cells.
+        x: Displacement along x in length units: a number or a function of position; ``None`` free.
+        y: Along y.
+        z: Along z.
+        amplitude: Factor in time; components that are 0 stay 0.
+        name: What the history calls it; the group's name by default.
+    """
+
+    where: str
+    x: Field | None = None
+    y: Field | None = None
+    z: Field | None = None
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a support that supports nothing."""
+        if self.x is None and self.y is None and self.z is None:
+            raise InputError(
+                f"Displacement('{self.where}') prescribes nothing; give x, y or z (0.0 holds it)"
+            )
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.where
+
+
+@dataclass(frozen=True)
+class Traction:
+    """Force per area on a named facet group.
+
+    Args:
+        where: Name of a facet group.
+        value: Components, force/length^2, each a number or a function of position.
+        amplitude: Factor in time.
+        name: What the history calls it.
+    """
+
+    where: str
+    value: tuple[Field, ...]
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.where
+
+
+@dataclass(frozen=True)
+class Pressure:
+    """Pressure on a named facet group, positive when it pushes into the body.
+
+    Args:
+        where: Name of a facet group.
+        value: Force/length^2, a number or a function of (undeformed) position.
+        amplitude: Factor in time.
+        name: What the history calls it.
+        follows: Stay normal to the deformed facets and act on their deformed area, instead of
+            keeping direction and size.
+    """
+
+    where: str
+    value: Field
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+    follows: bool = False
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.where
+
+
+@dataclass(frozen=True)
+class BodyForce:
+    """Force per volume.
+
+    Args:
+        value: Components, force/length^3.
+        where: Name of a cell group; ``None`` is the whole mesh.
+        amplitude: Factor in time.
+        name: What the history calls it.
+    """
+
+    value: tuple[Field, ...]
+    where: str | None = None
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or (self.where or "body") + "_force"
+
+
+@dataclass(frozen=True)
+class PointForce:
+    """A total force, shared equally by the nodes of a group.
+
+    Args:
+        where: Name of a group, usually of one node.
+        value: Components, force (the whole thickness or ring).
+        amplitude: Factor in time.
+        name: What the history calls it.
+    """
+
+    where: str
+    value: tuple[float, ...]
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.where
+
+
+Load = Traction | Pressure | BodyForce | PointForce
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """Mean displacement of a named group in one direction, written to the history.
+
+    Args:
+        where: Name of a group.
+        direction: Components of the direction; the displacement along it is reported.
+        name: Column of the history; group and direction by default.
+    """
+
+    where: str
+    direction: tuple[float, ...]
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse a direction that is none."""
+        if not (np.all(np.isfinite(self.direction)) and np.any(self.direction)):
+            raise InputError(
+                f"Monitor('{self.where}'): direction = {self.direction} must hold finite numbers, "
+                "not all of them zero"
+            )
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or f"u_{self.where}"

@@ -1,0 +1,263 @@
+"""Elastic materials as 6 x 6 stiffness matrices in global axes.
+
+Voigt order 11, 22, 33, 23, 13, 12 with engineering shears. A material knows nothing of meshes;
+the kinematic model (:mod:`fxcrack.continuum.kinematics`) picks the rows it needs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
+
+
+class Material(Protocol):
+    """What the continuum needs of a material."""
+
+    def stiffness(self) -> Array:
+        """Stiffness in global axes, shape (6, 6), force/length^2."""
+
+
+@dataclass(frozen=True)
+class Isotropic:
+    """Isotropic linear elasticity.
+
+    Args:
+        E: Young's modulus, force/length^2.
+        nu: Poisson's ratio, -1 < nu < 0.5.
+        expansion: Thermal strain per degree, 1/temperature.
+        density: Mass per volume; ``None`` where inertia plays no part.
+    """
+
+    E: float
+    nu: float
+    expansion: float = 0.0
+    density: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the constants."""
+        name = type(self).__name__
+        _check_numbers(name, E=self.E, nu=self.nu)
+        if not (np.isfinite(self.E) and self.E > 0.0):
+            raise InputError(f"{name}: E = {self.E} must be positive")
+        if not -1.0 < self.nu < 0.5:
+            raise InputError(f"{name}: nu = {self.nu} must lie between -1 and 0.5 (exclusive)")
+        _check_common(name, self.expansion, self.density)
+
+    def stiffness(self) -> Array:
+        """Stiffness, shape (6, 6)."""
+        shear = self.E / (2.0 * (1.0 + self.nu))
+        lame = self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
+        c = np.zeros((6, 6))
+        c[:3, :3] = lame
+        c[np.arange(3), np.arange(3)] += 2.0 * shear
+        c[np.arange(3, 6), np.arange(3, 6)] = shear
+        return c
+
+    def thermal_expansion(self) -> Array:
+        """Thermal strain per degree, shape (6,), 1/temperature."""
+        return self.expansion * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class Orthotropic:
+    """Orthotropic linear elasticity in a material frame.
+
+    Args:
+        E: Young's moduli (E1, E2, E3), force/length^2.
+        nu: Poisson's ratios (nu12, nu13, nu23); nu_ij/E_i = nu_ji/E_j.
+        G: Shear moduli (G12, G13, G23), force/length^2.
+        frame: Two global direction vectors, of axis 1 and of one in the plane of axes 1 and 2;
+            the default puts axes 1, 2, 3 along x, y, z.
+        expansion: Thermal strains per degree along axes 1, 2, 3, 1/temperature.
+        density: Mass per volume; ``None`` where inertia plays no part.
+    """
+
+    E: tuple[float, float, float]
+    nu: tuple[float, float, float]
+    G: tuple[float, float, float]
+    frame: tuple[tuple[float, float, float], tuple[float, float, float]] = (
+        (1.0, 0.0, 0.0),
+        (0.0, 1.0, 0.0),
+    )
+    expansion: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    density: float | None = None
+
+    def __post_init__(self) -> None:
+        """Check the constants and the frame."""
+        parts = {"E": "E1, E2, E3", "nu": "nu12, nu13, nu23", "G": "G12, G13, G23"}
+        for name, needed in parts.items():
+            value = getattr(self, name)
+            if np.shape(value) != (3,) or np.asarray(value).dtype.kind not in "fiu":
+                raise InputError(
+                    f"Orthotropic: {name} = {value!r} must be three numbers, ({needed}); a ply "
+                    "that is alike across its fibres has E3 = E2, nu13 = nu12, G13 = G12"
+                )
+        if min(*self.E, *self.G) <= 0.0 or not np.all(np.isfinite([*self.E, *self.G, *self.nu])):
+            raise InputError(f"Orthotropic: E = {self.E} and G = {self.G} must be positive numbers")
+        if np.linalg.eigvalsh(self._compliance()).min() <= 0.0:
+            raise InputError(
+                f"Orthotropic: nu = {self.nu} with E = {self.E} is no stable material "
+                "(compliance not positive definite); check the order nu12, nu13, nu23"
+            )
+        axis1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
+        if not np.all(np.isfinite(self.frame)):
+            raise InputError(f"Orthotropic: frame = {self.frame} must hold finite numbers")
+        if np.linalg.norm(np.cross(axis1, in_plane)) < 1e-8 * np.linalg.norm(axis1) * max(
+            float(np.linalg.norm(in_plane)), 1e-300
+        ):
+            raise InputError(f"Orthotropic: the two vectors of frame = {self.frame} are parallel")
+        if np.shape(self.expansion) != (3,):
+            raise InputError(
+                f"Orthotropic: expansion = {self.expansion} must be three numbers, one per axis"
+            )
+        _check_common("Orthotropic", self.expansion, self.density)
+
+    def _compliance(self) -> Array:
+        e1, e2, e3 = self.E
+        nu12, nu13, nu23 = self.nu
+        g12, g13, g23 = self.G
+        s = np.zeros((6, 6))
+        s[:3, :3] = [
+            [1.0 / e1, -nu12 / e1, -nu13 / e1],
+            [-nu12 / e1, 1.0 / e2, -nu23 / e2],
+            [-nu13 / e1, -nu23 / e2, 1.0 / e3],
+        ]
+        s[3, 3], s[4, 4], s[5, 5] = 1.0 / g23, 1.0 / g13, 1.0 / g12
+        return s
+
+    def stiffness(self) -> Array:
+        """Stiffness in global axes, shape (6, 6)."""
+        to_local = self._to_local()
+        return np.asarray(to_local.T @ np.linalg.inv(self._compliance()) @ to_local)
+
+    def thermal_expansion(self) -> Array:
+        """Thermal strain per degree in global axes, shape (6,), 1/temperature."""
+        local = np.array([*self.expansion, 0.0, 0.0, 0.0])
+        return np.asarray(np.linalg.solve(self._to_local(), local))
+
+    def _to_local(self) -> Array:
+        """Takes a strain from global axes to the frame, shape (6, 6)."""
+        e1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
+        e1 = e1 / np.linalg.norm(e1)
+        e3 = np.cross(e1, in_plane)
+        e3 /= np.linalg.norm(e3)
+        return strain_rotation(np.vstack([e1, np.cross(e3, e1), e3]))
+
+
+def _check_numbers(name: str, **values: object) -> None:
+    for key, value in values.items():
+        if isinstance(value, str) or not np.isscalar(value):
+            raise InputError(f"{name}: {key} = {value!r} is not a number; give one")
+
+
+def _check_common(name: str, expansion: float | tuple[float, ...], density: float | None) -> None:
+    if not np.all(np.isfinite(expansion)):
+        raise InputError(f"{name}: expansion = {expansion} must be finite")
+    if density is not None and not (np.isfinite(density) and density > 0.0):
+        raise InputError(f"{name}: density = {density} must be positive; leave it out for none")
+
+
+def strain_rotation(axes: Array) -> Array:
+    """Matrix that takes a Voigt strain from global to local axes.
+
+    Args:
+        axes: Rows are the local unit vectors in global components, shape (3, 3).
+
+    Returns:
+        Shape (6, 6); engineering shears on both sides.
+    """
+    pairs = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+    out = np.zeros((6, 6))
+    for j, (k, m) in enumerate(pairs):
+        unit = np.zeros((3, 3))
+        unit[k, m] = unit[m, k] = 1.0 if k == m else 0.5
+        local = axes @ unit @ axes.T
+        out[:, j] = [local[a, b] * (1.0 if a == b else 2.0) for a, b in pairs]
+    return out
+
+
+@dataclass(frozen=True)
+class NeoHookean(Isotropic):
+    """Compressible neo-Hookean material; finite strain.
+
+        W = mu/2 (tr F^t F - 3 - 2 ln J) + lambda/2 (ln J)^2
+
+    (Bonet and Wood 2008, eq. 6.28), with mu and lambda those of E and nu at zero strain. Energy and
+    stress grow without bound when a volume shrinks to nothing.
+
+    Args:
+        E: Young's modulus at zero strain, force/length^2.
+        nu: Poisson's ratio at zero strain, -1 < nu < 0.5.
+        expansion: Stretch per degree less one, 1/temperature.
+        density: Mass per undeformed volume.
+    """
+
+    form: ClassVar[str] = "neo_hookean"
+
+
+@dataclass(frozen=True)
+class Plastic(Isotropic):
+    """J2 plasticity with isotropic hardening; small strain.
+
+    Args:
+        E: Young's modulus, force/length^2.
+        nu: Poisson's ratio, -1 < nu < 0.5.
+        expansion: Thermal strain per degree, 1/temperature.
+        density: Mass per volume.
+        yield_stress: Stress at first yield, force/length^2; from the table where there is one.
+        hardening: Slope of the yield stress against the equivalent plastic strain, or a table of
+            (equivalent plastic strain, yield stress) that starts at strain 0, linear between
+            entries and constant after the last.
+
+    Raises:
+        InputError: A constant is out of range, or the yield stress falls.
+    """
+
+    form: ClassVar[str] = "plastic"
+    yield_stress: float | None = field(default=None, kw_only=True)
+    hardening: float | tuple[tuple[float, float], ...] = field(default=0.0, kw_only=True)
+
+    def __post_init__(self) -> None:
+        """Check the constants and the table."""
+        super().__post_init__()
+        if isinstance(self.hardening, int | float):
+            if self.yield_stress is None or not (
+                np.isfinite(self.yield_stress) and self.yield_stress > 0.0
+            ):
+                raise InputError(f"Plastic: yield_stress = {self.yield_stress} must be positive")
+            if not (np.isfinite(self.hardening) and self.hardening >= 0.0):
+                raise InputError(
+                    f"Plastic: hardening = {self.hardening} must not be negative (no softening)"
+                )
+            return
+        table = np.asarray(self.hardening, dtype=np.float64)
+        if table.ndim != 2 or table.shape[1] != 2 or not np.all(np.isfinite(table)):
+            raise InputError(
+                "Plastic: hardening must be a number or pairs (equivalent plastic strain, stress)"
+            )
+        if table[0, 0] != 0.0 or table[0, 1] <= 0.0 or np.any(np.diff(table[:, 0]) <= 0.0):
+            raise InputError(
+                f"Plastic: plastic strains {table[:, 0]} must start at 0 and increase, and the "
+                f"first stress {table[0, 1]} must be positive"
+            )
+        if np.any(np.diff(table[:, 1]) < 0.0):
+            raise InputError(f"Plastic: yield stresses {table[:, 1]} must not fall (no softening)")
+        if self.yield_stress is not None and self.yield_stress != table[0, 1]:
+            raise InputError(
+                f"Plastic: yield_stress = {self.yield_stress} contradicts the first entry "
+                f"{table[0, 1]} of the table; leave it out"
+            )
+
+    def curve(self) -> tuple[Array, Array, Array]:
+        """Knots of the plastic strain, yield stress there and slope after each."""
+        if isinstance(self.hardening, int | float):
+            assert self.yield_stress is not None
+            first, slope = float(self.yield_stress), float(self.hardening)
+            return np.zeros(1), np.array([first]), np.array([slope])
+        strain, stress = np.asarray(self.hardening, dtype=np.float64).T
+        return strain, stress, np.append(np.diff(stress) / np.diff(strain), 0.0)

@@ -1,0 +1,291 @@
+"""Temperature in the bodies: its field, the strain it causes and what that adds to the forms.
+
+    W = 1/2 int (e - e_th) : C : (e - e_th) w dV,    e_th = expansion (T - T_ref)
+
+In plane strain and in a ring e is the whole strain, out of the plane too, where thermal strain is
+held back and stores energy; in plane stress it is that of the plane: the sheet is free to thicken.
+"""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import basix
+import basix.ufl
+import dolfinx.mesh
+import numpy as np
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+
+from fxcrack.base import compat
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStress
+from fxcrack.continuum.loads import AmplitudeLike
+from fxcrack.continuum.materials import Material
+from fxcrack.continuum.temperature import ByTemperature, Spatial, Temperature, expansion_of
+
+if TYPE_CHECKING:
+    from fxcrack.continuum.continuum import Continuum
+
+
+class TemperatureField:
+    """The temperature of a scene on its mesh.
+
+    It is kept one order below the displacement, as strains are: constant in a first-order cell,
+    linear in a second-order one. So a temperature that the displacement can follow freely causes no
+    stress.
+
+    Args:
+        domain: The mesh.
+        order: Order of the displacement.
+        effect: What the user gave.
+
+    Attributes:
+        rise: T - T_ref at present.
+        patterns: T_k - T_ref of the patterns.
+        amplitudes: Their factors in time.
+        version: Counts the changes of ``rise``.
+    """
+
+    def __init__(self, domain: dolfinx.mesh.Mesh, order: int, effect: Temperature) -> None:
+        element = basix.ufl.element(
+            "DG",
+            domain.basix_cell(),
+            order - 1,
+            lagrange_variant=basix.LagrangeVariant.legendre,
+        )
+        space = fem.functionspace(domain, element)
+        self.effect = effect
+        self.domain = domain
+        self.rise = fem.Function(space, name="temperature_rise")
+        self.patterns: list[fem.Function] = []
+        self.amplitudes: list[AmplitudeLike] = []
+        self.version = 0
+        for field, amplitude in effect.patterns():
+            pattern = fem.Function(space)
+            _interpolate(pattern, field, effect.reference)
+            self.patterns.append(pattern)
+            self.amplitudes.append(amplitude)
+        self._factors = np.zeros(len(self.patterns))
+        self.set(0.0)
+
+    @property
+    def temperature(self) -> Any:
+        """Temperature at present, UFL."""
+        return self.effect.reference + self.rise
+
+    def set(self, time: float) -> None:
+        """Make a time the present one."""
+        factors = np.array([a(time) for a in self.amplitudes])
+        if np.array_equal(factors, self._factors):
+            return
+        self._factors = factors
+        self.rise.x.array[:] = 0.0
+        for factor, pattern in zip(factors, self.patterns, strict=True):
+            self.rise.x.array[:] += factor * pattern.x.array
+        self.version += 1
+
+    def nodal(self, space: fem.FunctionSpace, time: float) -> Array:
+        """Temperature at the local nodes of a (vector) Lagrange space, owned first, shape (n,)."""
+        factors = np.array([a(time) for a in self.amplitudes])
+        return np.asarray(self.effect.reference + factors @ self.nodal_patterns(space))
+
+    def nodal_patterns(self, space: fem.FunctionSpace) -> Array:
+        """Patterns at the local nodes of a (vector) Lagrange space, shape (n_patterns, n)."""
+        out = []
+        for field, _ in self.effect.patterns():
+            values = fem.Function(space)
+            _interpolate(values, field, self.effect.reference)
+            out.append(values.x.array[:: space.dofmap.index_map_bs].copy())
+        return np.array(out)
+
+
+def _interpolate(out: fem.Function, field: Spatial, reference: float) -> None:
+    """Set a function to (field - reference), all components alike."""
+    space = out.function_space
+    n = int(np.prod(out.ufl_shape))
+    if isinstance(field, fem.Function):
+        if field.function_space.mesh is not space.mesh or field.ufl_shape != ():
+            raise InputError(
+                "Temperature: a DOLFINx Function must be a scalar one on the mesh of the scene "
+                "(mesh.domain)"
+            )
+        value = field - reference
+        points = compat.interpolation_points(space)
+        out.interpolate(fem.Expression(value if n == 1 else ufl.as_vector([value] * n), points))
+    elif callable(field):
+
+        def values(x: Array) -> Array:
+            given = np.broadcast_to(field(x), x.shape[1]) - reference
+            return np.asarray(given if n == 1 else np.tile(given, (n, 1)))
+
+        out.interpolate(values)
+    else:
+        rise = float(field) - reference
+        out.interpolate(lambda x: np.full(x.shape[1] if n == 1 else (n, x.shape[1]), rise))
+
+
+@dataclass(frozen=True, eq=False)
+class ThermalLoad:
+    """Nodal forces int B^t C e_th w dV of one temperature pattern: what holds a clamped body.
+
+    Args:
+        pattern: Position among the patterns of the temperature.
+        amplitude: Factor in time.
+        title: Name in the history.
+    """
+
+    pattern: int
+    amplitude: AmplitudeLike
+    title: str
+
+
+def thermal_loads(continuum: Continuum) -> list[ThermalLoad]:
+    """The temperature of a linear continuum as loads; none where nothing expands."""
+    field = continuum.temperature
+    if field is None or not expands(continuum):
+        return []
+    names = ["temperature"]
+    if len(field.patterns) > 1:
+        names = [f"temperature_{k}" for k in range(len(field.patterns))]
+    return [
+        ThermalLoad(k, amplitude, name)
+        for k, (amplitude, name) in enumerate(zip(field.amplitudes, names, strict=True))
+    ]
+
+
+def expands(continuum: Continuum) -> bool:
+    """Whether any material of a continuum has thermal strain."""
+    return any(np.any(expansion_of(m)) for part in continuum.part_materials for m in _entries(part))
+
+
+def is_linear(continuum: Continuum) -> bool:
+    """Whether stiffness stays and thermal forces follow the amplitudes as time goes on."""
+    tabulated = any(isinstance(m, ByTemperature) for m in continuum.part_materials)
+    return not tabulated or (
+        continuum.temperature is not None and continuum.temperature.effect.steady
+    )
+
+
+def load_form(continuum: Continuum, load: ThermalLoad, v: Any) -> Any:
+    """Forces of a temperature pattern, as a form linear in the test function v."""
+    field = _field_of(continuum)
+    strain = whole(continuum.model, continuum.model.strain(v, continuum.x))
+    total = 0
+    for i, (_, _, dx) in enumerate(continuum.parts):
+        stress = ufl.dot(whole_stiffness(continuum, i), expansion(continuum, i))
+        total += field.patterns[load.pattern] * ufl.inner(stress, strain) * continuum.weight * dx
+    return total
+
+
+def held_energies(continuum: Continuum) -> Array:
+    """Energies E_kl = int e_k : C : e_l w dV of the patterns' thermal strains; collective.
+
+    With nodal forces f_k and factors a_k the energy stored in a linear continuum is
+    1/2 u K u - sum_k a_k f_k u + 1/2 sum_kl a_k a_l E_kl.
+
+    Returns:
+        Shape (n_patterns, n_patterns), force x length.
+    """
+    field = _field_of(continuum)
+    n = len(field.patterns)
+    out = np.zeros((n, n))
+    first, second = (fem.Function(field.rise.function_space) for _ in range(2))
+    total = 0
+    for i, (_, _, dx) in enumerate(continuum.parts):
+        e = expansion(continuum, i)
+        density = ufl.inner(ufl.dot(whole_stiffness(continuum, i), e), e)
+        total += first * second * density * continuum.weight * dx
+    form = fem.form(total)
+    for k in range(n):
+        for m in range(k, n):
+            first.x.array[:] = field.patterns[k].x.array
+            second.x.array[:] = field.patterns[m].x.array
+            out[k, m] = out[m, k] = continuum.comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM)
+    return out
+
+
+def _field_of(continuum: Continuum) -> TemperatureField:
+    if continuum.temperature is None:
+        raise InputError("the continuum has no temperature; give Continuum(..., temperature=...)")
+    return continuum.temperature
+
+
+def _entries(material: Material) -> list[Material]:
+    return material.materials if isinstance(material, ByTemperature) else [material]
+
+
+# -- strain and stiffness in which thermal strain is complete ------------------------------------
+
+
+def whole(model: Model, strain: Any) -> Any:
+    """A model's Voigt strain with all six components; plane stress keeps its three."""
+    e = strain
+    if isinstance(model, PlaneStress) or model.gdim == 3:
+        return e
+    if isinstance(model, Axisymmetric):
+        return ufl.as_vector([e[0], e[1], e[2], 0, 0, e[3]])
+    return ufl.as_vector([e[0], e[1], 0, 0, 0, e[2]])
+
+
+def whole_stiffness(continuum: Continuum, i: int) -> Any:
+    """Stiffness of a part on :func:`whole` strains, UFL."""
+    return interpolated(continuum, i, lambda m: _whole_matrix(continuum.model, m.stiffness()))
+
+
+def expansion(continuum: Continuum, i: int) -> Any:
+    """Thermal strain per degree of a part, components of :func:`whole`, UFL."""
+    keep = [0, 1, 5] if isinstance(continuum.model, PlaneStress) else list(range(6))
+    return interpolated(continuum, i, lambda m: expansion_of(m)[keep])
+
+
+def square_expansion(continuum: Continuum, i: int) -> Any:
+    """Square of the expansion as a tensor, components of :func:`whole`, UFL."""
+    keep = [0, 1, 5] if isinstance(continuum.model, PlaneStress) else list(range(6))
+
+    def square(m: Material) -> Array:
+        a = expansion_of(m)
+        t = np.array(
+            [[a[0], a[5] / 2, a[4] / 2], [a[5] / 2, a[1], a[3] / 2], [a[4] / 2, a[3] / 2, a[2]]]
+        )
+        s = t @ t
+        return np.array([s[0, 0], s[1, 1], s[2, 2], 2 * s[1, 2], 2 * s[0, 2], 2 * s[0, 1]])[keep]
+
+    return interpolated(continuum, i, square)
+
+
+def _whole_matrix(model: Model, c: Array) -> Array:
+    return model.reduce(c) if isinstance(model, PlaneStress) else c
+
+
+def interpolated(continuum: Continuum, i: int, quantity: Any) -> Any:
+    """A quantity of a part's material, linear in the present temperature where it is tabulated."""
+    domain, material = continuum.mesh.domain, continuum.part_materials[i]
+    values = [fem.Constant(domain, np.asarray(quantity(m))) for m in _entries(material)]
+    if len(values) == 1:
+        return values[0]
+    assert isinstance(material, ByTemperature)
+    temperature = _field_of(continuum).temperature
+    out = values[0]
+    knots = material.temperatures
+    for k, (low, high) in enumerate(itertools.pairwise(knots)):
+        share = ufl.max_value(0.0, ufl.min_value(1.0, (temperature - low) / (high - low)))
+        out = out + share * (values[k + 1] - values[k])
+    return out
+
+
+def whole_stress(continuum: Continuum, i: int, strain: Any) -> Any:
+    """All stresses (``model.stress_labels``) of a part at a small strain and the present field."""
+    field = _field_of(continuum)
+    model = continuum.model
+    elastic = whole(model, strain) - field.rise * expansion(continuum, i)
+    s = ufl.dot(whole_stiffness(continuum, i), elastic)
+    if isinstance(model, PlaneStress):
+        return ufl.as_vector([s[0], s[1], 0, s[2]])
+    if model.gdim == 3:
+        return s
+    return ufl.as_vector([s[0], s[1], s[2], s[5]])

@@ -1,0 +1,118 @@
+"""Criteria at a distance from the tip: stress ahead of it, opening behind it.
+
+Both are weighted sums of nodal values on one face of the slave surface, with the shape functions
+N of that face at the distance (small strain: reference positions decide where that is):
+
+    t(d) = sum_k N_k(d) t_k,    t_k = bond force / tributary area of node k
+    w(n) = sum_k N_k(n) w_k,    w_k = opening of node k, initial gap included
+
+so they are linear between two equilibria of the same states.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.interface.surface_paths import SurfacePaths, Way, locate
+from fxcrack.interface.tips import Tips
+from fxcrack.solvers.linear import LinearSolver
+
+_ROUND_OFF = 1e-11
+"""Tractions below this fraction of the largest one count as zero."""
+
+
+@dataclass(frozen=True)
+class Stencil:
+    """Nodes of one face per tip and what they weigh at a distance.
+
+    Attributes:
+        nodes: Slave nodes, shape (n_tips, k).
+        weights: Shape functions there, shape (n_tips, k).
+    """
+
+    nodes: Ints
+    weights: Array
+
+    @classmethod
+    def of(cls, parts: list[tuple[Ints, Array]], order: int) -> Stencil:
+        """Stack the parts of several tips; a single node is repeated with weight 0."""
+        k = order + 1
+        nodes, weights = np.zeros((len(parts), k), dtype=np.int64), np.zeros((len(parts), k))
+        for i, (n, w) in enumerate(parts):
+            nodes[i], weights[i, : len(w)] = n[0], w
+            nodes[i, : len(n)] = n
+        return cls(nodes, weights)
+
+    def __call__(self, values: Array) -> Array:
+        """Weighted sums, shape (n_tips, ...), of values of shape (n_tips, k, ...)."""
+        return np.asarray(np.einsum("nk,nk...->n...", self.weights, values))
+
+
+class _AtDistance:
+    """What both criteria share: ways along the surface and stencils kept for the present front.
+
+    Args:
+        solver: Condensed model, with its front in the initial state.
+        p: Number of the pair.
+        distance: From the tip, length.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
+    """
+
+    degree = 1
+
+    def __init__(
+        self, solver: LinearSolver, p: int, distance: float, temperature: Array | None
+    ) -> None:
+        self.solver = solver
+        self.p = p
+        self.distance = distance
+        self.temperature = temperature
+        self.front = solver.fronts[p]
+        self.surface = self.front.surface
+        self.paths = SurfacePaths(self.front)
+        self._known: dict[tuple[int, int, bytes], Stencil] = {}
+
+    def _key(self, tips: Tips) -> tuple[int, int, bytes]:
+        return self.front.version, self.front.placed, tips.node.tobytes()
+
+    def stencil(self, tips: Tips) -> Stencil:
+        """Stencil of the tips, found anew when the front or the bodies have moved."""
+        key = self._key(tips)
+        if key not in self._known:
+            parts = [self._part(tips, i) for i in range(len(tips))]
+            self._known = {key: Stencil.of(parts, self.surface.order)}
+        return self._known[key]
+
+    def temperature_at(self, tips: Tips) -> Array | None:
+        """Temperature of the tips, shape (n,); None without."""
+        return None if self.temperature is None else self.temperature[tips.node]
+
+    def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
+        """Slave nodes and weights at one tip; each evaluator has its own."""
+        raise NotImplementedError
+
+    def _check_start(self) -> None:
+        """Find the stencils of the initial tips, which complains about a wrong distance."""
+        tips = self.front.tips()
+        if len(tips):
+            self.stencil(tips)
+
+    def where(self, node: int) -> str:
+        """Interface and tip in words."""
+        x = self.surface.x[node, : self.solver.continuum.gdim]
+        x = np.where(np.abs(x) < 1e-9 * self.paths.longest, 0.0, x)
+        place = ", ".join(f"{c:.6g}" for c in x)
+        return f"interface '{self.solver.pairs[self.p].title}', tip at ({place})"
+
+    def breaks(self) -> tuple[float, ...]:
+        """What is measured does not depend on time as such."""
+        return ()
+
+
+def _on_face(way: Way, points: Array, distance: float, order: int) -> tuple[Ints, Array]:
+    """Nodes and weights of the place on a way at a distance from its beginning."""
+    rows, weights = locate("path", points, distance, order)
+    return way.nodes[rows], weights

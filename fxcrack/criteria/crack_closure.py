@@ -1,0 +1,207 @@
+"""Exact crack closure: the energy that releasing a unit of the front frees on this mesh, by mode.
+
+A unit is what is released together: one front node, or for second order a corner node and the
+midside node ahead of it. With S* the stiffness of its jumps (what else is free, is free) and p its
+bond forces, the jumps after release are delta = (S*)^-1 p and the energy freed is
+
+    G dA = 1/2 p . delta = 1/2 sum (p_n delta_n + p_s delta_s + p_t delta_t)
+
+the two-step crack closure integral of Irwin (1957), without an assumption on mesh, load or order.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import one_of
+from fxcrack.base.errors import InputError
+
+
+def opens(force: npt.ArrayLike, jump: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Which units open when they are released.
+
+    Those that are in tension do; also those in which the nodes ahead are pressed together harder
+    than the first is pulled (arms thinner than an element is long), if they set free energy by
+    opening.
+
+    Args:
+        force: Normal bond forces, tension positive, shape (n, k) [force].
+        jump: Normal jumps after release of all components, shape (n, k) [length].
+
+    Returns:
+        Shape (n,).
+    """
+    p, delta = np.asarray(force, dtype=np.float64), np.asarray(jump, dtype=np.float64)
+    pulled = p.sum(axis=1) > 0.0
+    return np.asarray(pulled | ((delta.sum(axis=1) > 0.0) & ((p * delta).sum(axis=1) > 0.0)))
+
+
+def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike) -> Array:
+    """Split the closure energy of units by mode.
+
+    A unit pressed together (:func:`opens` says no) stays closed when released: its G_I is zero.
+    The sum of its forces decides, not each node: in some second-order faces the corner force of a
+    uniform tension is zero or negative. For such units compute ``jump`` with the normal held, so
+    that shear alone is released.
+
+    Args:
+        force: Bond forces in the local frame (normal, growth direction, front tangent), tension
+            positive, shape (n, k, 3) [force]; k nodes per unit.
+        jump: Jumps of displacement after release, same frame, shape (n, k, 3) [length].
+        area: Area that releasing the unit sets free, shape (n,) or one number [length^2].
+
+    Returns:
+        G_I, G_II, G_III, shape (n, 3) [force/length]. They add up to the energy freed per area,
+        save for the normal part of closed units; single modes may be negative where modes are
+        coupled.
+
+    Raises:
+        InputError: Shapes disagree, or an area is not positive.
+    """
+    p = np.asarray(force, dtype=np.float64)
+    delta = np.asarray(jump, dtype=np.float64)
+    if p.shape != delta.shape or p.ndim != 3 or p.shape[2] != 3:
+        raise InputError(
+            f"crack closure: forces have shape {p.shape} and jumps {delta.shape}; both must be "
+            "(n, k, 3)"
+        )
+    a = np.broadcast_to(np.asarray(area, dtype=np.float64), p.shape[:1])
+    bad = np.flatnonzero(~((a > 0.0) & (a < np.inf)))
+    if bad.size:
+        raise InputError(
+            f"crack closure: the area of unit {bad[0]} is {a[bad[0]]}; it must be positive and "
+            "finite: look at the mesh near this front node"
+        )
+    rates = 0.5 * (p * delta).sum(axis=1) / a[:, None]
+    rates[~opens(p[..., 0], delta[..., 0]), 0] = 0.0
+    return np.asarray(rates)
+
+
+_OWNER = "VCCT"
+
+
+def energy_release_rates(
+    force: npt.ArrayLike,
+    opening: npt.ArrayLike,
+    d_ahead: npt.ArrayLike,
+    d_behind: npt.ArrayLike,
+    width: npt.ArrayLike,
+    *,
+    normalisation: Normalisation = "tributary",
+) -> Array:
+    r"""Energy release rates by mode at front nodes, with their sign.
+
+    The length that turns F w/2 into a rate on an uneven mesh, "tributary": near the front the
+    traction goes as K/sqrt(r) and the opening as K sqrt(r). A nodal force that collects the
+    traction of a length l is therefore proportional to K sqrt(l), an opening at distance l to K
+    sqrt(l), and
+
+        F w = 2 G b sqrt(l_F l_w)
+
+    with the factor fixed by even spacing, where F w = 2 G b d. First order: the force at the front
+    node collects from both elements at it, l_F = (d_ahead + d_behind)/2; l_w = d_behind. Second
+    order: the same for the corner force with the opening of the wake corner. The midside force
+    collects from the element ahead alone, so l_F goes as d_ahead; the wake midside lies at
+    d_behind/2, so l_w goes as d_behind:
+
+        G = F_corner w_corner/(2 b sqrt((d_ahead + d_behind)/2 d_behind))
+          + F_midside w_midside/(2 b sqrt(d_ahead d_behind))
+
+    On even spacing this is (F_corner w_corner + F_midside w_midside)/(2 b d) (Krueger 2002). The
+    others divide the sum of the products by 2 b times "ahead" d_ahead, "behind" d_behind,
+    "ahead_sqrt" sqrt(d_ahead d_behind), which is "ahead" corrected by sqrt(d_ahead/d_behind)
+    (Krueger 2002).
+
+    In 3-D with areas that are no product of a width and a length (fans, unstructured faces), give
+    the areas swept by the node ahead and behind as ``d_ahead`` and ``d_behind``, and ``width`` 1.
+    In axisymmetry the width is 2 pi r and forces are those of the full ring.
+
+    Args:
+        force: Bond forces, tension positive, shape (n, k, 3) [force]: k = 1 the front node; k = 2
+            (second order) the corner node, then the midside node ahead of it.
+        opening: Jumps of displacement behind, slave minus master, shape (n, k, 3) [length]: k = 1
+            the wake node; k = 2 the wake corner, then the wake midside.
+        d_ahead: Length of the element ahead, shape (n,) or one number [length]; may be 0, where the
+            surface ends, for "tributary" and "behind".
+        d_behind: Length of the element behind, shape (n,) or one number [length].
+        width: Width of the front that belongs to the node, shape (n,) or one number [length].
+        normalisation: "tributary", "ahead", "ahead_sqrt" or "behind".
+
+    Returns:
+        G_I, G_II, G_III, shape (n, 3) [force/length]. Closed wake nodes (w_n <= 0) do not count
+        for mode I. A negative rate (compression, strongly asymmetric arms) is kept: see
+        ``mixed_mode.clip``.
+
+    Raises:
+        InputError: Shapes disagree, a length or width is not positive, or ``normalisation`` is
+            unknown.
+    """
+    f = np.asarray(force, dtype=np.float64)
+    w = np.asarray(opening, dtype=np.float64)
+    if f.shape != w.shape or f.ndim != 3 or f.shape[1] not in (1, 2) or f.shape[2] != 3:
+        raise InputError(
+            f"{_OWNER}: forces have shape {f.shape} and openings {w.shape}; "
+            "both must be (n, 1, 3) or, for second order, (n, 2, 3)"
+        )
+    ahead, behind, b = (
+        np.broadcast_to(np.asarray(v, dtype=np.float64), f.shape[:1])
+        for v in (d_ahead, d_behind, width)
+    )
+    return weighted_rates(f, w, closure_weights(ahead, behind, b, f.shape[1], normalisation))
+
+
+def closure_weights(
+    ahead: Array, behind: Array, width: Array, n_products: int, normalisation: Normalisation
+) -> Array:
+    """What :func:`energy_release_rates` multiplies the products F w with.
+
+    Returns:
+        Shape (n, n_products) [1/length^2].
+
+    Raises:
+        InputError: As there.
+    """
+    one_of(_OWNER, "normalisation", normalisation, NORMALISATIONS)
+    end_allowed = normalisation in ("tributary", "behind")
+    _check_lengths(_OWNER, "d_ahead", ahead, zero=end_allowed)
+    _check_lengths(_OWNER, "d_behind", behind, zero=False)
+    _check_lengths(_OWNER, "width", width, zero=False)
+    if normalisation == "tributary":
+        corner = np.sqrt((ahead + behind) / 2.0 * behind)
+        midside = np.sqrt(ahead * behind)
+    else:
+        corner = midside = {
+            "ahead": ahead,
+            "ahead_sqrt": np.sqrt(ahead * behind),
+            "behind": behind,
+        }[normalisation]
+    lengths = np.stack([corner, midside], axis=-1)[:, :n_products]
+    # Where the surface ends there is no midside node ahead and its length is 0.
+    weight = np.divide(1.0, lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
+    return np.asarray(weight / (2.0 * width[:, None]))
+
+
+def weighted_rates(force: Array, opening: Array, weights: Array) -> Array:
+    """:func:`energy_release_rates` with weights at hand."""
+    products = force * opening
+    # closed wake nodes do not count for mode I
+    products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)
+    return np.asarray((products * weights[..., None]).sum(axis=1))
+
+
+def _check_lengths(owner: str, name: str, values: Array, *, zero: bool) -> None:
+    good = (values >= 0.0 if zero else values > 0.0) & (values < np.inf)
+    if not good.all():
+        row = int(np.flatnonzero(~good)[0])
+        raise InputError(
+            f"{owner}: {name} = {values[row]} at row {row} of the front nodes; it must be "
+            f"{'zero or ' if zero else ''}positive and finite: look at the mesh near this node"
+        )
+
+
+Normalisation = Literal["tributary", "ahead", "ahead_sqrt", "behind"]
+NORMALISATIONS = ("tributary", "ahead", "ahead_sqrt", "behind")

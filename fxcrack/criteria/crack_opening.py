@@ -1,0 +1,221 @@
+"""Critical crack opening displacement at a distance behind the tip.
+
+    f = d/d_c
+
+d is the normal distance between the two faces, between the points of slave and master surface
+that lie on a circle of the given radius around the current tip. Typical for ductile materials.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import not_negative, positive, table
+from fxcrack.base.errors import InputError
+from fxcrack.criteria.at_distance import Stencil, _AtDistance, _on_face
+from fxcrack.criteria.toughness import Tabulated
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.tips import Tips
+from fxcrack.solvers.linear import LinearSolver
+
+
+@dataclass(frozen=True)
+class CrackOpening:
+    """Growth when the opening at a distance behind the tip reaches a critical one.
+
+    Attributes:
+        critical: Critical opening [length]: a number; a table (lengths, values) against the
+            cumulative crack length, linear between entries and not extrapolated: before the first
+            and beyond the last length the value there holds; or a table against temperature.
+        distance: Straight-line distance behind the current tip [length].
+        symmetry: The faces lie on a symmetry plane: half the critical opening is used. Needs a
+            bond in the normal direction only.
+        tolerance: f_tol; growth is accepted while 1 - f_tol <= f <= 1 + f_tol.
+    """
+
+    critical: float | tuple[Sequence[float], Sequence[float]] | Tabulated
+    distance: float = field(kw_only=True)
+    symmetry: bool = field(default=False, kw_only=True)
+    tolerance: float = field(default=0.1, kw_only=True)
+
+    allows_normal_only: ClassVar[bool] = True
+    """Whether a bond in the normal direction only is possible."""
+
+    def __post_init__(self) -> None:
+        """Check the numbers and the table."""
+        owner = "CrackOpening"
+        positive(owner, distance=self.distance)
+        not_negative(owner, tolerance=self.tolerance)
+        if isinstance(self.critical, Tabulated):
+            return
+        if not isinstance(self.critical, tuple):
+            positive(owner, critical=self.critical)
+            return
+        if len(self.critical) != 2:
+            raise InputError(
+                f"{owner}: critical has {len(self.critical)} parts; give one number, or a table as "
+                "(crack lengths, critical openings)"
+            )
+        lengths, values = table(owner, ("crack lengths", "critical openings"), *self.critical)
+        for i, value in enumerate(values):
+            positive(owner, **{f"critical openings[{i}]": value})
+        object.__setattr__(self, "critical", (lengths, values))
+
+    @property
+    def release_range(self) -> tuple[float, float]:
+        """Lower and upper limit of f at which a node may debond."""
+        return 1.0 - self.tolerance, 1.0 + self.tolerance
+
+    def check_bond(self, *, normal_only: bool) -> None:
+        """Check the criterion against the bond it is used on.
+
+        Args:
+            normal_only: Whether the bond holds in the normal direction only.
+
+        Raises:
+            InputError: Symmetry with a bond in all directions.
+        """
+        if self.symmetry and not normal_only:
+            raise InputError(
+                "CrackOpening: symmetry needs a bond in the normal direction only; bond the "
+                "interface so, or model both halves and leave symmetry out"
+            )
+
+    def critical_at(
+        self, crack_length: npt.ArrayLike, temperature: npt.ArrayLike | None = None
+    ) -> Array:
+        """Critical opening, halved for symmetry [length].
+
+        Args:
+            crack_length: Length along the slave surface from initial to current tip, shape (n,)
+                or one number [length].
+            temperature: Temperature at the tips, shape (n,) or one number; None without.
+
+        Raises:
+            InputError: It depends on temperature and none is given.
+        """
+        grown = np.asarray(crack_length, dtype=np.float64)
+        if isinstance(self.critical, Tabulated):
+            if temperature is None:
+                raise InputError(
+                    "CrackOpening: critical depends on temperature, but the debond has none; give "
+                    "Debond(temperature=...), or the critical opening as a number"
+                )
+            values = self.critical.at(temperature) + 0.0 * grown
+        elif isinstance(self.critical, tuple):
+            values = np.interp(grown, *self.critical)
+        else:
+            values = np.full(grown.shape, self.critical)
+        return np.asarray(values / 2.0 if self.symmetry else values)
+
+    def value(
+        self,
+        opening: npt.ArrayLike,
+        crack_length: npt.ArrayLike = 0.0,
+        temperature: npt.ArrayLike | None = None,
+    ) -> Array:
+        """Value f of the criterion.
+
+        Args:
+            opening: Opening at the distance behind each tip, shape (n,) [length].
+            crack_length: As for :meth:`critical_at`.
+            temperature: Likewise.
+
+        Returns:
+            Values, shape (n,). Closed faces (negative openings) give 0.
+        """
+        critical = self.critical_at(crack_length, temperature)
+        return np.asarray(np.maximum(opening, 0.0) / critical)
+
+
+class OpeningEvaluator(_AtDistance):
+    """Critical opening at a straight-line distance behind the tip.
+
+    The critical value belongs to the length grown from the initial tip along the slave surface.
+
+    Args:
+        solver: Condensed model, with its front in the initial state.
+        p: Number of the pair.
+        criterion: Critical openings and distance.
+        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
+
+    Raises:
+        InputError: The distance lies outside the end points of the pair, or the critical opening
+            depends on temperature and there is none.
+    """
+
+    ahead = 0.0
+
+    def __init__(
+        self,
+        solver: LinearSolver,
+        p: int,
+        criterion: CrackOpening,
+        temperature: Array | None = None,
+    ) -> None:
+        super().__init__(solver, p, criterion.distance, temperature)
+        self.criterion = criterion
+        criterion.critical_at(0.0, temperature)
+        self.behind = criterion.distance + self.paths.longest
+        self._grown = np.zeros(self.surface.n_nodes)
+        self._warned = False
+        self._check_start()
+
+    def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
+        paired = self.solver.pairs[self.p].paired
+        way = self.paths.behind(tips, i, self.distance * (1.0 - 1e-12), paired)
+        reach = float(way.radius.max())
+        if self.distance > reach * (1.0 + 1e-12):
+            raise InputError(
+                f"{self.where(int(tips.node[i]))}: CrackOpening distance {self.distance:g} lies "
+                f"outside the end points of the pair, {reach:g} behind the tip; give a smaller "
+                "distance, or extend both surfaces"
+            )
+        nodes, weights = _on_face(way, way.x, min(self.distance, reach), self.surface.order)
+        bonded = self.front.bonded[nodes] & (nodes != tips.node[i])
+        if bonded[np.abs(weights) > 1e-9].any() and not self._warned:
+            self._warned = True
+            log.warn(
+                "%s: CrackOpening distance %g reaches back to bonded nodes behind the crack, "
+                "which do not open; give a smaller distance",
+                self.where(int(tips.node[i])),
+                self.distance,
+            )
+        return nodes, weights
+
+    def stencil(self, tips: Tips) -> Stencil:
+        """Stencil of the tips; the lengths they have grown are found with it."""
+        if self._key(tips) not in self._known:
+            self._grown[tips.node] = self.paths.origins(tips).grown
+        return super().stencil(tips)
+
+    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+        """Opening, and length grown so far, shape (n, 2), length."""
+        stencil = self.stencil(tips)
+        pair = self.solver.pairs[self.p]
+        jump = self.solver.vectors(self.p, stencil.nodes, state.jump)
+        normal = np.zeros((*stencil.nodes.shape, 3))
+        if self.front.placed:  # the arms turn to both sides of the normal at the tip
+            normal[:] = tips.frame[:, None, :, 0]
+        else:
+            normal[..., : self.solver.continuum.gdim] = pair.frames[stencil.nodes, :, 0]
+        opening = np.einsum("nkc,nkc->nk", normal, jump) + pair.gap[stencil.nodes]
+        return np.stack([stencil(opening), self._grown[tips.node]], axis=1)
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F, the opening cod and the length the tip has grown."""
+        opening, grown = measured.T
+        f = self.criterion.value(opening, grown, self.temperature_at(tips))
+        return f, {"cod": opening, "grown": grown}
+
+    def needs(self, tips: Tips) -> Ints:
+        """The open nodes whose openings are used."""
+        nodes = self.stencil(tips).nodes.ravel()
+        return np.asarray(nodes[~self.front.bonded[nodes]])

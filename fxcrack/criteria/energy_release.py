@@ -1,0 +1,383 @@
+"""What VCCT, enhanced VCCT and fatigue share: toughness by mode, mode mix, how G is computed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import not_negative, one_of
+from fxcrack.base.errors import InputError
+from fxcrack.criteria.crack_closure import (
+    NORMALISATIONS,
+    Normalisation,
+    closure_rates,
+    closure_weights,
+    weighted_rates,
+)
+from fxcrack.criteria.evaluator import TipValues, first_tips
+from fxcrack.criteria.interface_temperature import InterfaceTemperature
+from fxcrack.criteria.mixed_mode import BK, MixedMode, total
+from fxcrack.criteria.probe import bond_forces, closure_jumps, openings
+from fxcrack.criteria.release_laws import RampRelease, Release
+from fxcrack.criteria.toughness import Property, check_property, resolve
+from fxcrack.equilibrium.cohesive_law import CohesiveUnit
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.tips import FrontUnits, Tips, edge_midsides, units_of
+from fxcrack.solvers.linear import LinearSolver
+
+Method = Literal["vcct", "closure"]
+
+
+@dataclass(frozen=True, eq=False)
+class RateCriterion:
+    """What the criteria on energy release rates share: toughness, mode mix, how G is computed.
+
+    Attributes:
+        GIc: Mode I toughness [force/length]: a number, one value per slave node, a function of
+            position (n, gdim) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
+        GIIc: Mode II toughness, likewise; GIc when not given.
+        GIIIc: Mode III toughness, likewise; GIIc when not given.
+        mix: Mode-mix law. Needed as soon as GIIc or GIIIc is given. Without them all modes have the
+            toughness GIc and f = G_T/GIc.
+        tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
+        method: "vcct", or "closure": the exact energy of releasing the node.
+        normalisation: Length VCCT divides by, see
+            :func:`~fxcrack.criteria.crack_closure.energy_release_rates`.
+    """
+
+    GIc: Property
+    GIIc: Property | None = None
+    GIIIc: Property | None = None
+    mix: MixedMode | None = field(default=None, kw_only=True)
+    tolerance: float = field(default=0.2, kw_only=True)
+    method: Method = field(default="vcct", kw_only=True)
+    normalisation: Normalisation = field(default="tributary", kw_only=True)
+
+    allows_normal_only: ClassVar[bool] = False
+    """Whether a bond in the normal direction only is possible."""
+
+    def __post_init__(self) -> None:
+        """Check everything that does not need the interface."""
+        not_negative(self._owner, tolerance=self.tolerance)
+        one_of(self._owner, "method", self.method, ("vcct", "closure"))
+        one_of(self._owner, "normalisation", self.normalisation, NORMALISATIONS)
+        if self.mix is not None and (isinstance(self.mix, type) or not hasattr(self.mix, "ratio")):
+            raise InputError(
+                f"{self._owner}: mix = {self.mix!r} is no mode-mix law; give one with its "
+                "exponents, BK(eta=...), Reeder(eta=...) or Power(am=..., an=...)"
+            )
+        if self.mix is None and not (self.GIIc is None and self.GIIIc is None):
+            raise InputError(
+                f"{self._owner}: GIIc or GIIIc is given but no mode-mix law; "
+                "add mix=BK(eta=...), Reeder(eta=...) or Power(am=..., an=...)"
+            )
+        for name, value in self._properties().items():
+            check_property(self._owner, name, value)
+
+    @property
+    def _owner(self) -> str:
+        return type(self).__name__
+
+    @property
+    def law(self) -> MixedMode:
+        """The mode-mix law; with a single toughness any would do."""
+        return BK(eta=1.0) if self.mix is None else self.mix
+
+    @property
+    def release_range(self) -> tuple[float, float]:
+        """Lower and upper limit of f at which a node may debond."""
+        return 1.0, 1.0 + self.tolerance
+
+    def _properties(self) -> dict[str, Property]:
+        given = {"GIc": self.GIc, "GIIc": self.GIIc, "GIIIc": self.GIIIc}
+        return {name: value for name, value in given.items() if value is not None}
+
+    def check_slaves(self, n_slave: int) -> None:
+        """Check values given per slave node against the interface, before the analysis.
+
+        Args:
+            n_slave: Number of slave nodes of the interface.
+
+        Raises:
+            InputError: Some slave nodes have no value, or there are too many; with their numbers.
+        """
+        for name, value in self._properties().items():
+            check_property(self._owner, name, value, n_slave)
+
+    def toughness_at(
+        self,
+        x: Array,
+        nodes: npt.NDArray[np.integer],
+        temperature: npt.ArrayLike | None = None,
+        *,
+        n_slave: int,
+    ) -> Array:
+        """Toughness by mode at front nodes.
+
+        Args:
+            x: Positions of the front nodes, shape (n, gdim) [length].
+            nodes: Their numbers among the slave nodes of the interface, shape (n,).
+            temperature: Temperature there, shape (n,) or one number; None without temperatures.
+            n_slave: Number of slave nodes of the interface.
+
+        Returns:
+            G_Ic, G_IIc, G_IIIc, shape (n, 3) [force/length].
+
+        Raises:
+            InputError: A value is missing, NaN or not positive; with the slave node numbers.
+        """
+        return self._columns(
+            [("GIc", self.GIc), ("GIIc", self.GIIc), ("GIIIc", self.GIIIc)],
+            x,
+            nodes,
+            temperature,
+            n_slave,
+        )
+
+    def _columns(
+        self,
+        given: list[tuple[str, Property | None]],
+        x: Array,
+        nodes: npt.NDArray[np.integer],
+        temperature: npt.ArrayLike | None,
+        n_slave: int,
+    ) -> Array:
+        """Resolve three properties; one that is not given equals the one before."""
+        columns: list[Array] = []
+        for name, value in given:
+            columns.append(
+                columns[-1]
+                if value is None
+                else resolve(
+                    self._owner,
+                    name,
+                    value,
+                    x=x,
+                    nodes=nodes,
+                    temperature=temperature,
+                    n_slave=n_slave,
+                )
+            )
+        return np.stack(columns, axis=-1)
+
+    def propagation_toughness_at(
+        self,
+        x: Array,
+        nodes: npt.NDArray[np.integer],
+        temperature: npt.ArrayLike | None = None,
+        *,
+        n_slave: int,
+    ) -> Array | None:
+        """Toughness by mode that a bond spends once released, shape (n, 3) [force/length].
+
+        Arguments and errors as for :meth:`toughness_at`.
+
+        Returns:
+            None where the toughness of onset is spent.
+        """
+        return None
+
+    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Value f of the criterion, shape (n,); growth starts at 1.
+
+        Args:
+            rates: Energy release rates by mode, shape (n, 3) [force/length].
+            toughness: Toughness by mode, shape (n, 3) or (3,) [force/length].
+        """
+        return self.law.ratio(rates, toughness)
+
+    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Total rate at which growth starts at this mode mix, shape (n,) [force/length].
+
+        Arguments as for :meth:`ratio`.
+        """
+        return self.law.critical(rates, toughness)
+
+
+class RateEvaluator:
+    """Energy release rates by crack closure, for VCCT and the criteria built on it.
+
+    Args:
+        solver: Condensed model.
+        p: Number of the pair.
+        criterion: Criterion with toughness and mode mix.
+        temperature: Temperature of the slave nodes; None without.
+        softens: Whether bonds soften with their opening: second-order fronts then let go by element
+            edges, and f is that of the edge.
+    """
+
+    degree = 2
+    ahead = 0.0
+    behind = 0.0
+
+    def __init__(
+        self,
+        solver: LinearSolver,
+        p: int,
+        criterion: RateCriterion,
+        temperature: InterfaceTemperature | None = None,
+        *,
+        softens: bool = False,
+    ) -> None:
+        self.solver = solver
+        self.p = p
+        self.criterion = criterion
+        self._edges = edge_midsides(solver.fronts[p].surface) if softens else {}
+        self._grouped: tuple[Tips, FrontUnits] | None = None
+        self._weighed: Tips | None = None
+        self._weights = np.zeros((0, 1))
+        surface = solver.pairs[p].surface
+        criterion.check_slaves(surface.n_nodes)
+        x = surface.x[:, : solver.continuum.gdim]
+        self._temperature = temperature
+        self._moving = temperature is not None and not temperature.steady
+        at_start = None if temperature is None else temperature(0.0)
+        self.toughness = criterion.toughness_at(x, np.arange(len(x)), at_start, n_slave=len(x))
+
+    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+        """Tip forces and the openings they are multiplied with, shape (n, 6 k).
+
+        A last column holds the temperature of the tips where it changes in time.
+        """
+        force = bond_forces(self.solver, self.p, tips, state)
+        if self.criterion.method == "closure":
+            opening = closure_jumps(self.solver, self.p, tips, force)
+        else:
+            opening = openings(self.solver, self.p, tips, state)
+            if force.shape[1] == 2:
+                # on a ring the midside force belongs to its own circumference
+                breadth = self.solver.fronts[self.p].surface.breadth
+                force[:, 1] *= (breadth[tips.node] / breadth[tips.force_nodes[:, 1]])[:, None]
+        columns = [force.reshape(len(tips), -1), opening.reshape(len(tips), -1)]
+        if self._moving and self._temperature is not None:
+            columns.append(self._temperature(time)[tips.node, None])
+        return np.concatenate(columns, 1)
+
+    def rates(self, tips: Tips, measured: Array) -> Array:
+        """Energy release rates by mode, shape (n, 3), force/length."""
+        half = measured.shape[1] // 2
+        force, opening = (
+            m.reshape(len(tips), -1, 3) for m in (measured[:, :half], measured[:, half : 2 * half])
+        )
+        force = _real(force)
+        if self.criterion.method == "closure":
+            return closure_rates(force, opening, tips.area)
+        if tips is not self._weighed:
+            lengths = (tips.d_ahead, tips.d_behind, tips.width)
+            self._weights = closure_weights(*lengths, force.shape[1], self.criterion.normalisation)
+            self._weighed = tips
+        return weighted_rates(force, opening, self._weights)
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F and GI, GII, GIII."""
+        rates = self.rates(tips, measured)
+        toughness = self._toughness(tips, measured)
+        report = dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+        if not self._edges:
+            return self.criterion.ratio(rates, toughness), report
+        units = self.units(tips)
+        n = units.shares.shape[1]
+        rates, toughness = (units.mean(v.reshape(-1, n, 3)) for v in (rates, toughness))
+        f = self.criterion.ratio(rates.reshape(-1, 3), toughness.reshape(-1, 3))
+        return units.at_tips(f.reshape(rates.shape[:2])).ravel(), report
+
+    def units(self, tips: Tips) -> FrontUnits:
+        """Tips that let go together; of tips that were repeated, those of the first time."""
+        if self._grouped is None or self._grouped[0] is not tips:
+            once = np.unique(tips.node).size
+            self._grouped = tips, units_of(self._edges, first_tips(tips, once))
+        return self._grouped[1]
+
+    def _tip_temperature(self, tips: Tips, measured: Array | None) -> Array | None:
+        if self._temperature is None:
+            return None
+        if self._moving and measured is not None:
+            return measured[:, -1]
+        return self._temperature(0.0)[tips.node]
+
+    def _toughness(self, tips: Tips, measured: Array | None) -> Array:
+        """Toughness by mode at the tips, shape (n, 3), force/length."""
+        if not self._moving or measured is None:
+            return self.toughness[tips.node]
+        surface = self.solver.pairs[self.p].surface
+        x = surface.x[tips.node, : self.solver.continuum.gdim]
+        return self.criterion.toughness_at(x, tips.node, measured[:, -1], n_slave=surface.n_nodes)
+
+    def to_soften(self, nodes: Ints, values: TipValues, release: Release) -> list[CohesiveUnit]:
+        """Nodes that soften by one law each, and the energy it dissipates until they are free.
+
+        All nodes of a unit share a law: their forces, pressed ones included, fall in proportion,
+        and together they spend what the area of the unit asks for.
+
+        Args:
+            nodes: All nodes that let go now, shape (n,).
+            values: What the criterion says at the front they are part of.
+            release: How they let go.
+
+        Raises:
+            NotPositiveDefinite: A body would come free: without bound is what its last unit frees.
+        """
+        surface = self.solver.fronts[self.p].surface
+        tips, units = values.tips, self.units(values.tips)
+        rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
+        toughness = self._toughness(tips, values.measured)
+        propagation = self.criterion.propagation_toughness_at(
+            self.solver.pairs[self.p].surface.x[tips.node, : self.solver.continuum.gdim],
+            tips.node,
+            self._tip_temperature(tips, values.measured),
+            n_slave=surface.n_nodes,
+        )
+        if propagation is not None:
+            toughness = propagation
+        rates, toughness = units.mean(rates), units.mean(toughness)
+        critical = self.criterion.critical(rates, toughness)
+        if isinstance(release, RampRelease) and propagation is None:
+            # 1/2 F0 w_c with the opening of the wake: what crack closure calls G A
+            critical = total(rates)
+        if np.any(critical > UNBOUNDED_RATE * toughness[:, 0]):
+            worst = units.leaders[np.argmax(critical)]
+            raise NotPositiveDefinite(int(tips.node[worst]))
+        out, left = [], np.unique(nodes)
+        # a corner row that two edges share goes with the one that is more critical; rows that are
+        # to go alone (fatigue) come last
+        order = np.argsort(-values.f[units.leaders], kind="stable")
+        groups = [(k, units.leaders[k], units.shares[k] > 0.0) for k in order]
+        for i in np.setdiff1d(np.arange(len(tips)), units.leaders):
+            groups.append((np.argmax(units.shares[:, i]), i, np.arange(len(tips)) == i))
+        for k, first, rows in groups:
+            if tips.node[first] not in left:
+                continue
+            unit = np.intersect1d(tips.force_nodes[rows], left)
+            left = np.setdiff1d(left, unit)
+            energy = float(critical[k] * surface.areas[unit].sum())
+            out.append(CohesiveUnit(unit, energy, bool(rates[k, 0] <= 0.0)))
+        return out
+
+    def needs(self, tips: Tips) -> Ints:
+        """Nothing beyond the tips themselves."""
+        return np.zeros(0, dtype=np.int64)
+
+    def breaks(self) -> tuple[float, ...]:
+        """Rates do not depend on time as such; a temperature does."""
+        return self._temperature.breaks() if self._temperature is not None else ()
+
+
+_NO_MODE = 1e-11
+"""Forces of a mode below this fraction of the largest are round-off. A mode so weak would have
+1e-22 of the rate of the others; alone, beside pressure, it would ask for loads without end."""
+
+
+def _real(force: Array) -> Array:
+    """Bond forces without the modes that are there by round-off alone, shape (n, k, 3)."""
+    size = np.abs(force).max(axis=1, initial=0.0)
+    none = size < _NO_MODE * size.max(axis=1, keepdims=True, initial=0.0)
+    return np.where(none[:, None], 0.0, force)
+
+
+UNBOUNDED_RATE = 1e50
+"""Rates beyond this multiple of the toughness belong to units that hold a body alone."""

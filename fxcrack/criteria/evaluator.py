@@ -1,0 +1,159 @@
+"""What a criterion says at the tips of one interface.
+
+An evaluator measures quantities at the tips that are linear between two equilibria of the same
+states (bond forces, openings, tractions, time), and turns them into f and what the history
+reports. So the place where f reaches 1 on a linear piece is found without another solve.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.tips import Tips
+
+
+@dataclass(frozen=True)
+class TipValues:
+    """What the criterion says at the tips of one interface.
+
+    Attributes:
+        tips: Front nodes.
+        f: Criterion, shape (n,).
+        report: Quantities behind it by name, each of shape (n,), e.g. GI, GII, GIII.
+        measured: What f was found from, shape (n, m), if it is to be used again.
+        state: The equilibrium it belongs to.
+    """
+
+    tips: Tips
+    f: Array
+    report: dict[str, Array]
+    measured: Array | None = None
+    state: Equilibrium | None = None
+
+    @property
+    def largest(self) -> int:
+        """Position of the critical tip: the first of those whose f differ by round-off only."""
+        top = self.f.max()
+        return int(np.argmax(self.f >= top - 1e-9 * abs(top)))
+
+
+class Evaluator(Protocol):
+    """A criterion applied to a model.
+
+    Attributes:
+        degree: f grows with this power of a proportional load.
+        ahead: Distance ahead of a tip whose bond forces are needed, length.
+        behind: Distance behind a tip whose openings are needed, length.
+    """
+
+    degree: int
+    ahead: float
+    behind: float
+
+    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+        """Quantities linear between equilibria, shape (n_tips, m)."""
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F and report from measured quantities, shape (n_tips, m)."""
+
+    def needs(self, tips: Tips) -> Ints:
+        """Slave nodes beyond force and wake nodes whose jumps the window must hold."""
+
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which what is measured bends."""
+
+
+_ROUND_OFF = 1e-13
+"""Differences below this fraction of the largest value do not make a path bend."""
+
+
+def repeat_tips(tips: Tips, times: int) -> Tips:
+    """The same tips several times over, first all of them once, then again."""
+    if times == 1:
+        return tips
+
+    def tile(a: Any) -> Any:
+        return np.tile(a, (times,) + (1,) * (a.ndim - 1))
+
+    return Tips(**{name: tile(getattr(tips, name)) for name in Tips.__dataclass_fields__})
+
+
+def first_tips(tips: Tips, n: int) -> Tips:
+    """The first tips alone."""
+    if n == len(tips):
+        return tips
+    return Tips(**{name: getattr(tips, name)[:n] for name in Tips.__dataclass_fields__})
+
+
+def first_crossing(
+    evaluator: Evaluator,
+    tips: Tips,
+    ends: tuple[tuple[Equilibrium, float], tuple[Equilibrium, float]],
+    *,
+    upward: bool = True,
+    known: TipValues | None = None,
+) -> float | None:
+    """First fraction of a linear piece at which the largest f crosses 1.
+
+    Args:
+        evaluator: The criterion.
+        tips: Front nodes.
+        ends: Equilibrium and time at both ends.
+        upward: Look for f rising to 1, or falling to it.
+        known: What was found before, perhaps at the first end.
+
+    Returns:
+        Fraction between 0 and 1, ``None`` if f stays on its side.
+    """
+    if not len(tips):
+        return None
+    a, b = (
+        known.measured
+        if known is not None and known.measured is not None and known.state is state
+        else evaluator.measure(tips, state, time)
+        for state, time in ends
+    )
+    n = len(tips)
+    if known is not None and known.measured is a and known.f.max() > 0.0:
+        scale = float(np.vdot(a, b) / np.vdot(a, a))
+        if np.abs(b - scale * a).max() <= _ROUND_OFF * np.abs(b).max():
+            # proportional: f grows with a power of the load
+            rise = known.f.max() ** (-1.0 / evaluator.degree) - 1.0
+            x = rise / (scale - 1.0) if scale != 1.0 else np.inf
+            return float(x) if 0.0 <= x <= 1.0 else None
+
+    def root(x: Array) -> Array:
+        many = np.concatenate([(1.0 - y) * a + y * b for y in x])
+        f, _ = evaluator.value(repeat_tips(tips, len(x)), many)
+        largest = np.maximum(f.reshape(len(x), n).max(axis=1), 0.0)
+        return np.asarray(largest ** (1.0 / evaluator.degree) - 1.0)
+
+    grid = np.linspace(0.0, 1.0, 9)
+    values = root(grid)
+    passed = values >= 0.0 if upward else values <= 0.0
+    if not passed.any():
+        return None
+    k = int(np.argmax(passed))
+    if k == 0:
+        return 0.0
+    low, high, f_low, f_high = grid[k - 1], grid[k], values[k - 1], values[k]
+    for _ in range(60):
+        # linear for proportional loads: the secant hits at once (Illinois safeguard otherwise)
+        x = low - f_low * (high - low) / (f_high - f_low)
+        if not low < x < high:
+            break
+        value = float(root(np.array([x]))[0])
+        if abs(value) < 4e-15:
+            return float(x)
+        if (value >= 0.0) == upward:
+            high, f_high, f_low = x, value, 0.5 * f_low
+        else:
+            low, f_low, f_high = x, value, 0.5 * f_high
+        if high - low < 1e-15:
+            break
+    return float(high)

@@ -1,0 +1,96 @@
+"""Temperature of the slave nodes of an interface at any time.
+
+T(t) = T_ref + sum_k a_k(t) (T_k - T_ref),    linear in time between the amplitudes' corners
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import AmplitudeLike
+from fxcrack.interface.nodes import NodeValues
+from fxcrack.interface.pairing import Pair
+
+Given = float | Callable[[Array], npt.ArrayLike] | None
+
+
+@dataclass(frozen=True)
+class InterfaceTemperature:
+    """Fields on the slave nodes and their factors in time.
+
+    Attributes:
+        base: Temperature without any of them, shape (n_nodes,).
+        patterns: What each adds, shape (n_patterns, n_nodes).
+        amplitudes: Factors in time.
+    """
+
+    base: Array
+    patterns: Array
+    amplitudes: tuple[AmplitudeLike, ...] = ()
+
+    def __call__(self, time: float) -> Array:
+        """Temperature of the slave nodes at a time, shape (n_nodes,)."""
+        factors = np.array([a(time) for a in self.amplitudes])
+        return np.asarray(self.base + factors @ self.patterns)
+
+    @property
+    def steady(self) -> bool:
+        """Whether it never changes."""
+        return not self.amplitudes
+
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which it bends."""
+        return tuple(b for a in self.amplitudes for b in a.breaks())
+
+
+def given_temperature(pair: Pair, gdim: int, temperature: Given) -> InterfaceTemperature | None:
+    """Temperature a user gave for an interface; None without.
+
+    Raises:
+        InputError: The function returned another shape, or a temperature is not finite.
+    """
+    if temperature is None:
+        return None
+    x = pair.surface.x[:, :gdim]
+    where = f"interface '{pair.title}'"
+    given = np.asarray(temperature(x) if callable(temperature) else temperature, dtype=float)
+    if given.shape not in ((), (len(x),)):
+        raise InputError(
+            f"{where}: temperature gives shape {given.shape} for positions of shape {x.shape}; one "
+            "number per slave node is needed (the first coordinate is x[:, 0])"
+        )
+    values = np.broadcast_to(given, (len(x),))
+    if not np.isfinite(values).all():
+        i = int(np.argmin(np.isfinite(values)))
+        raise InputError(
+            f"{where}: temperature is {values[i]} at {format_point(x[i])}; give a number"
+        )
+    return InterfaceTemperature(values, np.zeros((0, len(x))))
+
+
+def scene_temperature(pair: Pair, continuum: Continuum) -> InterfaceTemperature | None:
+    """That of the bodies at an interface, None where they have none; collective."""
+    field = continuum.temperature
+    if field is None:
+        return None
+    reader = NodeValues(continuum, pair.surface.dofs)
+    rows = reader.find(pair.surface.dofs)
+
+    def at_nodes(values: Array) -> Array:
+        owned = np.repeat(values, continuum.gdim)[: continuum.n_local]
+        return np.asarray(reader.gather(owned)[rows, 0])
+
+    patterns = np.array([at_nodes(p) for p in field.nodal_patterns(continuum.space)])
+    base = np.full(len(rows), field.effect.reference)
+    if field.effect.steady:
+        factors = np.array([a(0.0) for a in field.amplitudes])
+        return InterfaceTemperature(base + factors @ patterns, patterns[:0])
+    return InterfaceTemperature(base, patterns, tuple(field.amplitudes))

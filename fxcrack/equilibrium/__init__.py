@@ -1,0 +1,1 @@
+"""The interface on S, numpy only: bonds, contact, friction, cohesive bonds."""

@@ -1,0 +1,83 @@
+"""One bond that softens with its opening.
+
+    F(w) = F0 (1 - w/w_f)            w the opening along F0, while it grows
+    F(w) = F(w_max) w/w_max          when it goes back (secant), w_max never heals
+
+Nodes of a second-order element edge share one such law: F0 and w go over all of their components.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from fxcrack.base.arrays import Array, Ints
+
+STIFFEST = 1e-7
+"""The secant of a bond that unloads at once is that of this fraction of its final opening."""
+
+NEUTRAL = 1e-8
+"""A state counts as unstable if it were so with bonds that soften faster by this fraction. A bond
+whose onset is found by exact crack closure is neutral there: round-off must not decide."""
+
+
+class CohesiveUnit(NamedTuple):
+    """Nodes that are to soften by one law.
+
+    Attributes:
+        nodes: Slave nodes, shape (n,).
+        energy: What they dissipate together until they are free, force times length.
+        pressed: Whether their faces are pressed together: mode I takes no part.
+    """
+
+    nodes: Ints
+    energy: float
+    pressed: bool
+
+
+@dataclass
+class CohesiveBond:
+    """One bond, or several by one law, that softens.
+
+    Attributes:
+        components: Its window components, shape (k,).
+        direction: Unit vector of the opening w in them, shape (k,).
+        strength: F0, force.
+        final: w_f, length.
+        where: Pair, and per component slave node and jump component, each of shape (k,), to find
+            the bond again after a rebase.
+        largest: w_max on the secant branch, ``None`` while the opening grows, length.
+    """
+
+    components: Ints
+    direction: Array
+    strength: float
+    final: float
+    where: tuple[int, Ints, Ints]
+    largest: float | None = None
+
+    def opening(self, jump: Array) -> float:
+        """W of a state."""
+        return float(self.direction @ jump[self.components])
+
+    def force(self, opening: float) -> float:
+        """Tensile force at an opening on the present branch."""
+        if self.largest is None:
+            return self._envelope(opening)
+        return self._envelope(self.largest) + self.secant * (opening - self.largest)
+
+    def _envelope(self, opening: float) -> float:
+        return self.strength * (1.0 - opening / self.final)
+
+    def taken(self, opening: float) -> float:
+        """Energy the bond has taken up to an opening, the part it would give back included."""
+        most = opening if self.largest is None else self.largest
+        back = most - opening
+        given_back = back * (self._envelope(most) - 0.5 * self.secant * back)
+        return self.strength * most * (1.0 - 0.5 * most / self.final) - given_back
+
+    @property
+    def secant(self) -> float:
+        """Stiffness of the secant branch, force/length."""
+        w = max(self.largest or 0.0, STIFFEST * self.final)
+        return self._envelope(w) / w

@@ -1,0 +1,250 @@
+"""Friction on a condensed model: which nodes take part, and their states over a new window.
+
+The states belong to slave nodes of pairs; the window numbers them anew at every factorisation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
+from fxcrack.equilibrium.coulomb import OPEN, SLIP, STICK
+from fxcrack.equilibrium.friction import Friction
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.front import Front
+from fxcrack.interface.pairing import Pair
+
+
+@dataclass
+class FrictionMemory:
+    """Friction states by pair and slave node.
+
+    Attributes:
+        where: Pair and slave node, shape (m, 2).
+        status: Open, stick or slip, shape (m,).
+        direction: Slip directions, shape (m, d - 1).
+        reference: Tangential jumps, shape (m, d - 1), length.
+        error: See :class:`fxcrack.equilibrium.friction.Friction`.
+    """
+
+    where: Ints
+    status: Ints
+    direction: Array
+    reference: Array
+    error: float = 0.0
+
+    @classmethod
+    def empty(cls, dim: int) -> FrictionMemory:
+        """Nothing has happened yet."""
+        none = np.zeros((0, dim - 1))
+        return cls(np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int64), none, none)
+
+    @classmethod
+    def of(cls, friction: Friction, state: Equilibrium) -> FrictionMemory:
+        """What has to be remembered of an equilibrium, which is committed."""
+        friction.commit(state.jump)
+        return cls(
+            friction.where,
+            friction.states.status,
+            friction.states.direction,
+            friction.reference,
+            friction.error,
+        )
+
+    def state_dict(self) -> dict[str, npt.NDArray[Any]]:
+        """Plain arrays, for :meth:`from_state_dict`."""
+        return {
+            "where": self.where,
+            "status": self.status,
+            "direction": self.direction,
+            "reference": self.reference,
+            "error": np.array([self.error]),
+        }
+
+    @classmethod
+    def from_state_dict(cls, state: Mapping[str, npt.NDArray[Any]]) -> FrictionMemory:
+        """The memory that :meth:`state_dict` was made of."""
+        return cls(
+            np.asarray(state["where"], dtype=np.int64),
+            np.asarray(state["status"], dtype=np.int64),
+            np.asarray(state["direction"], dtype=float),
+            np.asarray(state["reference"], dtype=float),
+            float(state["error"][0]),
+        )
+
+
+@dataclass(frozen=True)
+class Slide:
+    """Energy that friction takes on a way that is predicted on a tangent and corrected at its end.
+
+    Attributes:
+        predicted: Energy on the predicted way.
+        start: Tangential jumps at its beginning, shape (m, d - 1), length.
+        jump: Those predicted for its end.
+        traction: Tangential contact forces predicted there, shape (m, d - 1).
+    """
+
+    predicted: float
+    start: Array
+    jump: Array
+    traction: Array
+
+    @classmethod
+    def of(cls, system: ContactSystem, points: list[tuple[float, Equilibrium]]) -> Slide:
+        """The predicted way, while the system still holds the tangent it was predicted on."""
+        friction = system.friction
+        assert friction is not None
+        end = points[-1][1]
+        return cls(
+            sum(friction.dissipation(system, a, b) for (_, a), (_, b) in pairwise(points)),
+            friction.of(points[0][1].jump)[:, 1:],
+            friction.of(end.jump)[:, 1:],
+            friction.traction(system, end)[:, 1:],
+        )
+
+    def energy(self, system: ContactSystem, end: Equilibrium) -> float:
+        """Energy up to the corrected end, on whose tangent the system is now.
+
+        The corrections of slips and forces grow with the square of the way.
+        """
+        friction = system.friction
+        assert friction is not None
+        rough = friction.mu > 0.0
+        more = (friction.of(end.jump)[:, 1:] - self.jump)[rough]
+        change = friction.traction(system, end)[rough, 1:] - self.traction[rough]
+        lost = np.sum((self.traction[rough] + 0.5 * change) * more)
+        lost += np.sum(change * (self.jump - self.start)[rough]) / 3.0
+        return self.predicted - float(lost)
+
+
+def has_friction(pairs: list[Pair]) -> bool:
+    """Whether any interface has friction."""
+    return any(pair.friction is not None for pair in pairs)
+
+
+def nodes_of(pair: Pair, front: Front, index: Ints) -> Ints:
+    """Slave nodes that may touch: open, paired, with a normal jump in the window."""
+    if not pair.interface.contact:
+        return np.zeros(0, dtype=np.int64)
+    return np.flatnonzero(~front.bonded & pair.paired & (index[:, 0] >= 0))
+
+
+def make_friction(
+    system: ContactSystem,
+    pairs: list[Pair],
+    fronts: list[Front],
+    index: list[Ints],
+    memory: FrictionMemory,
+) -> None:
+    """Make the block of contact nodes of a new window."""
+    friction = Friction(index[0].shape[1])
+    friction.error = memory.error
+    known = {(int(p), int(k)): i for i, (p, k) in enumerate(memory.where)}
+    for p, (pair, front, numbers) in enumerate(zip(pairs, fronts, index, strict=True)):
+        nodes = nodes_of(pair, front, numbers)
+        gap = pair.gap[nodes]
+        status = np.where(gap <= 0.0, STICK, OPEN)
+        reference = np.zeros((len(nodes), friction.dim - 1))
+        direction = np.zeros_like(reference)
+        direction[:, 0] = 1.0
+        for j, node in enumerate(nodes):
+            i = known.get((p, int(node)))
+            if i is not None:
+                status[j] = memory.status[i]
+                direction[j], reference[j] = memory.direction[i], memory.reference[i]
+        _add(friction, p, pair, nodes, numbers, status, direction, reference)
+    system.set_friction(friction)
+
+
+def _add(
+    friction: Friction,
+    p: int,
+    pair: Pair,
+    nodes: Ints,
+    index: Ints,
+    status: Ints,
+    direction: Array,
+    reference: Array,
+) -> None:
+    mu = np.zeros(len(nodes)) if pair.friction is None else pair.friction[nodes]
+    where = np.column_stack([np.full(len(nodes), p), nodes])
+    friction.add(index[nodes], where, mu, pair.gap[nodes], status, direction, reference)
+
+
+def contact_share(
+    system: ContactSystem, pair: Pair, index: Ints, nodes: Ints, state: Equilibrium
+) -> tuple[Array, Ints, Array]:
+    """What contact takes over from the bonds of nodes that are let go.
+
+    Pressure stays, and so does shear up to mu times the pressure: what exceeds it is released.
+
+    Returns:
+        Forces on the slave side, shape (k, d); status and slip direction of the nodes.
+    """
+    friction = system.friction
+    assert friction is not None
+    components = index[nodes]
+    force = np.zeros(components.shape)
+    inside = components >= 0
+    force[inside] = system.forces(state, components[inside])
+    pressed = (force[:, 0] > 0.0) & inside[:, 0]
+    mu = np.zeros(len(nodes)) if pair.friction is None else pair.friction[nodes]
+    shear = np.linalg.norm(force[:, 1:], axis=1)
+    bound = mu * np.maximum(force[:, 0], 0.0)
+    slips = pressed & (shear > bound)
+    direction = np.zeros((len(nodes), friction.dim - 1))
+    direction[:, 0] = 1.0
+    direction[slips] = -force[slips, 1:] / shear[slips, None]
+    stays = np.where(shear > bound, bound / np.where(shear > 0.0, shear, 1.0), 1.0)
+    taken = np.where(pressed[:, None], force, 0.0)
+    taken[:, 1:] *= stays[:, None]
+    return taken, np.where(slips, SLIP, np.where(pressed, STICK, OPEN)), direction
+
+
+def release_to_contact(
+    system: ContactSystem, p: int, pair: Pair, index: Ints, nodes: Ints, state: Equilibrium
+) -> Array:
+    """Move bonded nodes to the contact nodes.
+
+    Returns:
+        Their bond forces less what contact takes over, shape (k, d).
+
+    Raises:
+        NotPositiveDefinite: A body would come free; nothing is changed.
+    """
+    friction = system.friction
+    assert friction is not None
+    nodes = nodes[index[nodes, 0] >= 0]
+    taken, status, direction = contact_share(system, pair, index, nodes, state)
+    reference = np.zeros((len(nodes), friction.dim - 1))
+    _add(friction, p, pair, nodes, index, status, direction, reference)
+    try:
+        friction.condensed(system, np.zeros(0, dtype=np.int64))
+    except NotPositiveDefinite:
+        friction.drop(len(nodes))
+        raise
+    components = index[nodes]
+    force = state.force.copy()
+    inside = components >= 0
+    rows = components[inside]
+    force[rows] = system.forces(state, rows) - taken[inside]
+    system.set_friction(friction)
+    system.contact[components[:, 0]] = system.touches[components[:, 0]] = True
+    return force
+
+
+__all__ = [
+    "FrictionMemory",
+    "contact_share",
+    "has_friction",
+    "make_friction",
+    "nodes_of",
+    "release_to_contact",
+]

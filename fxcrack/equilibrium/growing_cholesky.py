@@ -1,0 +1,221 @@
+"""A dense Cholesky factor that grows and shrinks with the set of free unknowns.
+
+    L L^t = S[free, free]
+
+Appending k unknowns costs one forward substitution, removing some costs the trailing block.
+All work is done on strips of rows, by BLAS; a strip is no wider than its last diagonal entry, so
+the factor takes half of S, and it grows without copies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.linalg import lapack
+
+from fxcrack.base.arrays import Array, Ints
+
+_BLOCK = 64
+
+
+class NotPositiveDefinite(ArithmeticError):
+    """A pivot vanished: the unknown ``index`` is not restrained by anything.
+
+    Attributes:
+        index: Number of the unknown in S.
+    """
+
+    def __init__(self, index: int) -> None:
+        super().__init__(f"unknown {index} is not restrained")
+        self.index = index
+
+
+class GrowingCholesky:
+    """Factor of a growing principal block of a symmetric matrix.
+
+    Args:
+        matrix: S, shape (n, n); only read.
+        floor: A pivot below ``floor`` times the diagonal of S counts as zero.
+
+    Attributes:
+        round_off: Round-off of the entries of S; a pivot below it counts as zero as well. A number
+            or one per unknown, shape (n,).
+    """
+
+    def __init__(self, matrix: Array, *, floor: float = 1e-10) -> None:
+        self._matrix = matrix
+        self._floor = floor
+        self.round_off: float | Array = 0.0
+        self._strips: list[Array] = []  # rows of L, 64 by 64, no wider than their last diagonal
+        self._inverse: list[Array] = []
+        self.free: Ints = np.zeros(0, dtype=np.int64)
+
+    def __len__(self) -> int:
+        """Number of free unknowns."""
+        return len(self.free)
+
+    def _write(self, first: int, rows: Array) -> None:
+        """Store rows of L from a row on, shape (k, at least the columns up to their diagonals)."""
+        for block, a, b, width in self._strips_of(first, first + len(rows)):
+            if block == len(self._strips):
+                self._strips.append(np.zeros((_BLOCK, width)))
+            width = min(width, rows.shape[1])
+            begin = block * _BLOCK
+            self._strips[block][a - begin : b - begin, :width] = rows[a - first : b - first, :width]
+
+    def _read(self, first: int, left: int, right: int) -> Array:
+        """Rows of L from ``first`` on, columns ``left`` to ``right``, zero above the diagonal."""
+        n = len(self.free)
+        out = np.zeros((n - first, right - left))
+        for block, a, b, width in self._strips_of(first, n):
+            width = min(width, right)
+            if width > left:
+                begin = block * _BLOCK
+                part = self._strips[block][a - begin : b - begin, left:width]
+                out[a - first : b - first, : width - left] = part
+        return out
+
+    @staticmethod
+    def _strips_of(first: int, last: int) -> Iterator[tuple[int, int, int, int]]:
+        """Number, first and last row, and width of the strips that hold some rows."""
+        for block in range(first // _BLOCK, (last + _BLOCK - 1) // _BLOCK):
+            begin = block * _BLOCK
+            yield block, max(first, begin), min(last, begin + _BLOCK), begin + _BLOCK
+
+    def corner(self, k: int) -> Array:
+        """Diagonal block of the last k unknowns, lower triangular, shape (k, k)."""
+        n = len(self.free)
+        return self._read(n - k, n - k, n)
+
+    def _diagonal_inverse(self, block: int) -> Array:
+        """Inverse of a whole diagonal block, kept once the block is full."""
+        while len(self._inverse) <= block:
+            i = len(self._inverse) * _BLOCK
+            tile = np.asfortranarray(self._strips[len(self._inverse)][:, i:])
+            inverse, _ = lapack.dtrtri(tile, lower=1)
+            self._inverse.append(np.tril(inverse))
+        return self._inverse[block]
+
+    def forward(self, right: Array, start: int = 0) -> Array:
+        """Solve L y = right.
+
+        Args:
+            right: Shape (n_free,) or (n_free, m).
+            start: Entries of ``right`` before it are known to be zero.
+        """
+        n = len(self.free)
+        y = np.array(right, dtype=float)
+        for block in range(start // _BLOCK, (n + _BLOCK - 1) // _BLOCK):
+            i, j = block * _BLOCK, min((block + 1) * _BLOCK, n)
+            if i:
+                y[i:j] -= self._strips[block][: j - i, :i] @ y[:i]
+            y[i:j] = self._solve_tile(block, j - i, y[i:j], transposed=False)
+        return y
+
+    def backward(self, right: Array) -> Array:
+        """Solve L^t x = right, shape (n_free,) or (n_free, m)."""
+        n = len(self.free)
+        x = np.array(right, dtype=float)
+        for block in range((n + _BLOCK - 1) // _BLOCK - 1, -1, -1):
+            i, j = block * _BLOCK, min((block + 1) * _BLOCK, n)
+            x[i:j] = self._solve_tile(block, j - i, x[i:j], transposed=True)
+            if i:
+                x[:i] -= self._strips[block][: j - i, :i].T @ x[i:j]
+        return x
+
+    def _solve_tile(self, block: int, width: int, right: Array, *, transposed: bool) -> Array:
+        if width == _BLOCK:
+            inverse = self._diagonal_inverse(block)
+            return np.asarray((inverse.T if transposed else inverse) @ right)
+        i = block * _BLOCK
+        tile = np.asfortranarray(self._strips[block][:width, i : i + width])
+        columns = right.reshape(width, -1)
+        x, _ = lapack.dtrtrs(tile, columns, lower=1, trans=1 if transposed else 0)
+        return np.asarray(x).reshape(right.shape)
+
+    def solve(self, right: Array) -> Array:
+        """Solve S[free, free] x = right, shape (n_free,) or (n_free, m)."""
+        return self.backward(self.forward(right))
+
+    def reduced(self, extra: Ints) -> tuple[Array, Array]:
+        """What S[extra, extra] becomes once the free unknowns are condensed out.
+
+        Args:
+            extra: Unknowns that are not free, shape (k,).
+
+        Returns:
+            y = L^-1 S[free, extra], shape (n_free, k), and S* = S[extra, extra] - y^t y.
+        """
+        y = self.forward(self._matrix[np.ix_(self.free, extra)])
+        return y, self._matrix[np.ix_(extra, extra)] - y.T @ y
+
+    def append(self, extra: Ints) -> Array:
+        """Free more unknowns.
+
+        Args:
+            extra: Their numbers in S, shape (k,), none of them free yet.
+
+        Returns:
+            The new rows left of the new diagonal block, shape (k, n_free before).
+
+        Raises:
+            NotPositiveDefinite: One of them is restrained by nothing; the factor is unchanged.
+        """
+        extra = np.asarray(extra, dtype=np.int64)
+        y, star = self.reduced(extra)
+        tile = self.factorise(star, extra)
+        self._write(len(self.free), np.hstack([y.T, tile]))
+        self.free = np.concatenate([self.free, extra])
+        return y.T
+
+    def factorise(self, star: Array, extra: Ints) -> Array:
+        """Lower Cholesky factor of S* from :meth:`reduced`, shape (k, k).
+
+        Raises:
+            NotPositiveDefinite: One of the unknowns is restrained by nothing.
+        """
+        tile, info = lapack.dpotrf(star, lower=1, clean=1)
+        scale = self._matrix[extra, extra]
+        least = np.broadcast_to(self.round_off, len(self._matrix))[extra]
+        bad = np.diagonal(tile) ** 2 <= np.maximum(self._floor * scale, least)
+        if info > 0:
+            raise NotPositiveDefinite(int(extra[info - 1]))
+        if np.any(bad):
+            raise NotPositiveDefinite(int(extra[np.argmax(bad)]))
+        return np.asarray(tile)
+
+    def remove(self, gone: Ints) -> int:
+        """Hold unknowns again.
+
+        Args:
+            gone: Their numbers in S.
+
+        Returns:
+            Position of the first one removed: rows before it are unchanged.
+        """
+        drop = np.isin(self.free, gone)
+        if not drop.any():
+            return len(self.free)
+        n, first = len(self.free), int(np.argmax(drop))
+        keep = np.flatnonzero(~drop[first:]) + first
+        trailing = self._read(first, first, n)
+        square = trailing @ trailing.T
+        inner = keep - first
+        left = self._read(first, 0, first)[inner]
+        self.free = self.free[~drop]
+        if len(keep):
+            tile, _ = lapack.dpotrf(square[np.ix_(inner, inner)], lower=1, clean=1)
+            self._write(first, np.hstack([left, tile]))
+        del self._strips[(len(self.free) + _BLOCK - 1) // _BLOCK :]
+        self._inverse = self._inverse[: first // _BLOCK]
+        return first
+
+    def back_unit(self, position: int) -> Array:
+        """Row of the inverse, S[free, free]^-1 e_position, shape (n_free,)."""
+        unit = np.zeros(len(self.free))
+        unit[position] = 1.0
+        return self.backward(self.forward(unit, start=position))
+
+
+__all__ = ["GrowingCholesky", "NotPositiveDefinite"]

@@ -1,0 +1,259 @@
+"""How far a run is off for its mesh's sake, judged without knowing the answer.
+
+The same scene is run to its first onset with displacements of the other order on the same mesh. For
+a first-order run the difference is its error, but for the error of the second-order one, which goes
+with the element size as well: the estimate is twice the difference. For a second-order run the
+difference is the error of the first-order one, and so a bound that is often far too large.
+Increment stepping adds what f exceeded 1 by. Growth far from the first onset on a coarser mesh is
+not judged.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.criteria import Fatigue, RateCriterion
+from fxcrack.history import History, Row
+from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.end_conditions import Releases
+from fxcrack.steps.static import Static
+
+if TYPE_CHECKING:
+    from fxcrack.scene import Scene
+    from fxcrack.steps.debond import Debond
+
+_MORE = 2.0
+"""Estimated error of a first-order run over its difference from the second-order one."""
+_ORDERS = {1: "first", 2: "second"}
+_SMALL = 1e-6
+"""Reactions below this share of the largest are round-off."""
+
+
+class AccuracyError(FxcrackError):
+    """The accuracy asked for is not reached, or cannot be judged; the history is kept.
+
+    Attributes:
+        estimate: What was found; ``None`` if nothing could be.
+    """
+
+    def __init__(self, message: str, estimate: Estimate | None = None) -> None:
+        super().__init__(message)
+        self.estimate = estimate
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated relative errors of a run.
+
+    Attributes:
+        load: Of the load at the first onset; for cycles of the load at their maximum.
+        G: Of the energy release rate at given loads or at given openings, the larger one (of f for
+            other criteria).
+        stepping: Of the load, by the increments.
+        cycles: Of the number of cycles; ``None`` for quasi-static steps.
+        order: Order of the displacement.
+        size: Mean length of the facets at the first front.
+        difference: Largest difference between the orders.
+        interface: Name of the interface.
+    """
+
+    load: float
+    G: float
+    stepping: float
+    cycles: float | None
+    order: int
+    size: float
+    difference: float
+    interface: str
+
+    @property
+    def total(self) -> float:
+        """The largest of the errors, each with that of the increments."""
+        return max(self.load, self.G, self.cycles or 0.0) + self.stepping
+
+    def __str__(self) -> str:
+        """What it found, in words."""
+        other = _ORDERS[3 - self.order]
+        parts = [f"the load {_percent(self.load)}", f"G {_percent(self.G)}"]
+        if self.cycles is not None:
+            parts.append(f"the number of cycles {_percent(self.cycles)}")
+        text = (
+            f"this mesh ({_ORDERS[self.order]} order, elements of {self.size:.3g} at the crack of "
+            f"'{self.interface}') gives {', '.join(parts)} off at first growth, "
+            f"{'about' if self.order == 1 else 'or less'}, judged by the {other}-order solution "
+            "on the same mesh"
+        )
+        if self.stepping > 0.0:
+            text += f"; its increments add {_percent(self.stepping)} to the load"
+        return text
+
+    def remedy(self, accuracy: float) -> str:
+        """What would reach an accuracy."""
+        out = []
+        mesh = self.total - self.stepping
+        if self.stepping > 0.5 * accuracy:
+            out.append(
+                f"stepping='event' or a tolerance of the criterion of at most {accuracy:.1g}"
+            )
+        if mesh > accuracy - min(self.stepping, 0.5 * accuracy):
+            size = self.size * accuracy / mesh
+            out.append(f"elements of at most about {size:.2g} at the crack and like ones elsewhere")
+            if self.order == 1 and self.difference <= accuracy:
+                out[-1] += ", or order=2 on this mesh"
+        return " and ".join(out)
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
+
+
+def check_accuracy(accuracy: float) -> None:
+    """Refuse an accuracy that is no share.
+
+    Raises:
+        InputError: It does not lie between 0 and 1.
+    """
+    if not 0.0 < accuracy < 1.0:
+        raise InputError(f"accuracy = {accuracy}: give a relative error between 0 and 1, e.g. 0.01")
+
+
+def demand(
+    scene: Scene, step: Static | Cycles, accuracy: float, grow: Sequence[Debond]
+) -> Estimate:
+    """Estimate the errors of a scene's run and refuse it if they are too large; collective.
+
+    Args:
+        scene: The scene, after its run.
+        step: The step it ran.
+        accuracy: Largest relative error allowed.
+        grow: Debonds that were allowed to grow.
+
+    Raises:
+        AccuracyError: The accuracy is not reached, or cannot be judged.
+    """
+    estimate = estimate_errors(scene, step, grow)
+    if estimate.total > accuracy:
+        remedy = estimate.remedy(accuracy)
+        raise AccuracyError(
+            f"accuracy = {_percent(accuracy)} is not reached: {estimate}. For "
+            f"{_percent(accuracy)} use {remedy}. The run is complete and kept in scene.history; "
+            "leave accuracy out to take it as it is",
+            estimate,
+        )
+    return estimate
+
+
+def estimate_errors(scene: Scene, step: Static | Cycles, grow: Sequence[Debond]) -> Estimate:
+    """See :func:`demand`.
+
+    Raises:
+        AccuracyError: Nothing can be said; the message says why.
+    """
+    cycles = isinstance(step, Cycles)
+    ours, name, excess = _first(scene.history, grow, cycles=cycles)
+    order = scene.continuum.order
+    degree = 2 if all(isinstance(d.criterion, RateCriterion) for d in grow) else 1
+    try:
+        twin = type(scene)(scene.mesh, **{**scene.parts, "order": 3 - order})
+        try:
+            short = _to_onset(step, linear=scene.plan.path == "condensed")
+            twin.run(short, grow=grow, progress=False)
+            theirs, _, other = _first(twin.history, grow, cycles=cycles)
+            size = _size(twin, name)
+        finally:
+            twin.close()
+    except FxcrackError as error:
+        raise AccuracyError(
+            f"the accuracy of this run cannot be judged: the scene does not run with order="
+            f"{3 - order} on the same mesh ({error}). Compare with a finer mesh instead: fxcrack "
+            "accuracy does so for any scene function. The run is kept in scene.history"
+        ) from error
+    scale = ((1.0 + other) / (1.0 + excess)) ** (1.0 / degree)  # both at f = 1
+    load, rate = _differences(ours, theirs, name, degree, scale, cycles=cycles)
+    more = _MORE if order == 1 else 1.0
+    life = None
+    if cycles:
+        exponents = [abs(d.criterion.paris.c4) for d in grow if isinstance(d.criterion, Fatigue)]
+        life = (1.0 + more * rate) ** max(exponents, default=0.0) - 1.0
+    return Estimate(
+        load=more * load,
+        G=more * rate,
+        stepping=_largest(scene.history, name) ** (1.0 / degree) - 1.0 if excess else 0.0,
+        cycles=life,
+        order=order,
+        size=size,
+        difference=max(load, rate),
+        interface=name,
+    )
+
+
+def _to_onset(step: Static | Cycles, *, linear: bool) -> Static | Cycles:
+    """The step as far as the first growth; to f = 1 exactly where the bodies are linear."""
+    if isinstance(step, Cycles):
+        return replace(step, until=(), n_max=1.0)
+    if not linear:
+        return replace(step, until=Releases(1))
+    return Static(Releases(1), stepping="path" if step.stepping == "path" else "event")
+
+
+def _size(scene: Scene, name: str) -> float:
+    """Mean element length at the front of an interface; that of all its facets without a front."""
+    growth = next(g for g in scene.cracks if g.title == name)
+    tips = growth.tips()
+    return float(tips.d_ahead.mean() if len(tips) else growth.front.surface.facet_size)
+
+
+def _first(history: History, grow: Sequence[Debond], *, cycles: bool) -> tuple[Row, str, float]:
+    """The first row in which a crack is about to grow, the interface, and f - 1 there."""
+    names = [d.interface.title for d in grow]
+    for row in history:
+        if cycles and row["event"] == "cycle":
+            return row, names[0], 0.0
+        if cycles or row["event"] not in ("onset", "increment"):
+            continue
+        f = {n: float(row.get(f"f[{n}]", 0.0)) for n in names}
+        name = max(f, key=lambda n: f[n])
+        if f[name] >= 1.0 - 1e-9:
+            excess = f[name] - 1.0 if row["event"] == "increment" else 0.0
+            return row, name, max(excess, 0.0)
+    raise AccuracyError(
+        "the accuracy of this run cannot be judged: nothing grew in it "
+        f"({history.reason}), so there is no critical load to compare"
+    )
+
+
+def _largest(history: History, name: str) -> float:
+    """The largest f at which something was let go."""
+    rows = [r for r in history if r["event"] == "increment"]
+    return max((float(r.get(f"f[{name}]", 0.0)) for r in rows), default=1.0)
+
+
+def _differences(
+    ours: Row, theirs: Row, name: str, degree: int, scale: float, *, cycles: bool
+) -> tuple[float, float]:
+    """Relative differences of the load, and of G at given loads or openings, the larger one."""
+    moving = [k[2:-1] for k in ours if k.startswith("u[")]
+    loads = [f"R[{k}]" for k in moving] + [k for k in ours if k.startswith("F[")]
+    drivers = [f"u[{k}]" for k in moving] + [k for k in ours if k.startswith("F[")]
+    load = _largest_difference(ours, theirs, loads, scale)
+    if cycles:
+        key = f"G_max[{name}]"
+        return load, abs(float(ours[key]) / float(theirs[key]) - 1.0)
+    driver = _largest_difference(ours, theirs, drivers, scale)
+    return load, (1.0 + max(driver, load)) ** degree - 1.0
+
+
+def _largest_difference(ours: Row, theirs: Row, columns: list[str], scale: float) -> float:
+    values = {c: (scale * float(ours[c]), float(theirs[c])) for c in columns}
+    largest = max((abs(b) for _, b in values.values()), default=0.0)
+    return max(
+        (abs(a / b - 1.0) for a, b in values.values() if abs(b) > _SMALL * largest), default=0.0
+    )
+
+
+def as_details(estimate: Estimate) -> dict[str, Any]:
+    """Plain types for the details of a history."""
+    return {**asdict(estimate), "total": estimate.total, "words": str(estimate)}

@@ -1,0 +1,167 @@
+"""The history of an analysis: a table with one row per event, and how it is written.
+
+Events: start and end of a step; "onset" (f = 1, just before nodes go; not in increment stepping),
+"release" (just after), "bend" (of an amplitude, in event stepping: everything is linear in time
+between rows), "snap" (softening bonds have run through unstable states), "increment".
+
+Columns (brackets hold the name of a support, load, monitor or interface):
+time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[..] load factor and
+its work-conjugate displacement, m[..] monitored displacement, a[..] crack length, area[..] open
+area, f[..] largest criterion value and GI, GII, GIII[..] there, node[..] where, released[..]
+number of released nodes; strain_energy, external_work, released_energy, balance; where they occur
+viscous_energy, snap_energy (part of released_energy), and in fatigue steps N, G_max[..], dG[..],
+dadN[..].
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, overload
+
+import numpy as np
+import numpy.typing as npt
+from mpi4py import MPI
+
+from fxcrack.base.errors import InputError, unknown_name
+from fxcrack.base.files import replacing
+from fxcrack.base.parallel import all_or_none
+
+Row = dict[str, float | int | str]
+
+
+class History:
+    """Rows of an analysis, the same on every rank.
+
+    Args:
+        comm: Communicator; rank 0 writes files.
+
+    Attributes:
+        rows: One dictionary per row.
+        reason: Why the last step ended.
+        details: What else is worth keeping (timings, window, releases), plain types only.
+    """
+
+    def __init__(self, comm: MPI.Comm) -> None:
+        self._comm = comm
+        self.rows: list[Row] = []
+        self.reason = ""
+        self.details: dict[str, Any] = {}
+
+    @property
+    def comm(self) -> MPI.Comm:
+        """Communicator; rank 0 writes files."""
+        return self._comm
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Row]:
+        """Rows in order."""
+        return iter(self.rows)
+
+    @property
+    def columns(self) -> list[str]:
+        """Column names in order of first appearance."""
+        return list(dict.fromkeys(k for row in self.rows for k in row))
+
+    def append(self, row: Row) -> None:
+        """Add a row."""
+        self.rows.append(row)
+
+    @overload
+    def __getitem__(self, column: str) -> npt.NDArray[Any]: ...
+
+    @overload
+    def __getitem__(self, column: int) -> Row: ...
+
+    def __getitem__(self, column: str | int) -> npt.NDArray[Any] | Row:
+        """A column as an array, NaN where a row lacks it; by a whole number, that row.
+
+        Raises:
+            InputError: No row has the column.
+            IndexError: There are fewer rows.
+        """
+        if isinstance(column, int):
+            return self.rows[column]
+        if self.rows and column not in self.columns:
+            unknown_name("column", column, self.columns)
+        return np.array([row.get(column, np.nan) for row in self.rows])
+
+    def at(self, column: str, value: float, *, event: str | None = None) -> Row:
+        """First row where a column reaches a value (to round-off), optionally of one event.
+
+        Raises:
+            InputError: There is no such row, column or event.
+        """
+        for row in self.rows:
+            found = row.get(column, np.nan)
+            if event is not None and row["event"] != event:
+                continue
+            if isinstance(found, (int, float)) and found >= value - 1e-9 * abs(value):
+                return row
+        if self.rows and column not in self.columns:
+            unknown_name("column", column, self.columns)
+        chosen = [r for r in self.rows if event is None or r["event"] == event]
+        if not chosen:
+            events = list(dict.fromkeys(str(r["event"]) for r in self.rows))
+            unknown_name("row of event", str(event), events)
+        most = max((r[column] for r in chosen if column in r), default="none")
+        raise InputError(
+            f"there is no row with {column} >= {value:g} among {len(chosen)} rows"
+            f"{'' if event is None else f' of event {event!r}'}; the largest is {most}"
+        )
+
+    def to_csv(self, path: str | Path) -> None:
+        """Write all rows as comma-separated values; collective, rank 0 writes."""
+        with all_or_none(self._comm, f"writing {path}"):
+            if self._comm.rank == 0:
+                self.write_csv(path)
+
+    def to_json(self, path: str | Path) -> None:
+        """Write rows, reason and details as JSON; collective, rank 0 writes."""
+        with all_or_none(self._comm, f"writing {path}"):
+            if self._comm.rank == 0:
+                self.write_json(path)
+
+    def write_csv(self, path: str | Path) -> None:
+        """As :meth:`to_csv`, on one rank alone."""
+        with replacing(path) as temporary, temporary.open("w", newline="") as stream:
+            writer = csv.DictWriter(stream, self.columns)
+            writer.writeheader()
+            writer.writerows(self.rows)
+
+    def write_json(self, path: str | Path) -> None:
+        """As :meth:`to_json`, on one rank alone."""
+        content = {"reason": self.reason, "details": self.details, "rows": self.rows}
+        with replacing(path) as temporary:
+            temporary.write_text(json.dumps(content, indent=1))
+
+    def plot(
+        self,
+        path: str | Path,
+        *,
+        x: str | npt.ArrayLike | None = None,
+        y: str | npt.ArrayLike | None = None,
+        **options: Any,
+    ) -> None:
+        """Plot load against opening; collective.
+
+        Args:
+            path: Picture file (.png, .pdf, .svg).
+            x: Column or array with one value per row; by default the first prescribed
+                displacement that moves, absolute value.
+            y: Column or array; by default the reaction that belongs to it, absolute value.
+            **options: As for :func:`fxcrack.output.plots.curves.load_opening`: reference curves
+                ``[(label, x, y)]``, xlabel, ylabel, label, title.
+
+        Raises:
+            InputError: A column is unknown, or there is none to choose.
+            FxcrackError: The file could not be written.
+        """
+        from fxcrack.output import plots  # loads matplotlib: only those who plot wait for it
+
+        plots.load_opening(self, path, x=x, y=y, **options)

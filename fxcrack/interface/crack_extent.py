@@ -1,0 +1,96 @@
+"""How far a crack has run: open length along a line, or open area over the front width.
+
+2-D: the length of the open run that ends at a tip, measured along the slave surface from the end
+of the surface; half of it when both its ends are tips.
+3-D: open area divided by the length of the initial front; the facets cut by the front count half.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.interface.front import Front
+from fxcrack.interface.tips import Tips
+
+
+class CrackExtent:
+    """Crack length and open area of one interface.
+
+    Args:
+        front: Its front, in the initial state.
+    """
+
+    def __init__(self, front: Front) -> None:
+        self._front = front
+        self._surface = surface = front.surface  # lengths are those of the undeformed surface
+        self._line = surface.dim == 1
+        tips = front.tips()
+        self._front_length = float(tips.width.sum()) if len(tips) else 0.0
+        self._known: tuple[int, list[tuple[int, float]]] = (-1, [])
+        if self._line:
+            self._paths = [_along(path, surface.x) for path in _polylines(surface.facets[:, :2])]
+
+    def area(self, tips: Tips) -> float:
+        """Open area (length times thickness or ring in 2-D), length^2."""
+        surface, bonded = self._surface, self._front.bonded
+        total = float(surface.areas[~bonded].sum())
+        # the front stands half-way into the facets it cuts; with second-order shape functions
+        # a corner node stands for a sixth of each facet
+        share = 0.5 if surface.order == 1 else 1.0 / 6.0
+        return total + share * float((tips.width * tips.d_behind).sum())
+
+    def length(self, tips: Tips) -> float:
+        """Crack length: of the longest run in 2-D, the mean over the front in 3-D."""
+        if not self._line:
+            return self.area(tips) / self._front_length if self._front_length else 0.0
+        return max((a for _, a in self.lengths()), default=0.0)
+
+    def lengths(self) -> list[tuple[int, float]]:
+        """Tip node and crack length of every tip on a line; -1 where a run has no tip."""
+        if self._known[0] != self._front.version:
+            self._known = (self._front.version, self._measure())
+        return self._known[1]
+
+    def _measure(self) -> list[tuple[int, float]]:
+        out: list[tuple[int, float]] = []
+        for nodes, s in self._paths:
+            bonded = self._front.bonded[nodes]
+            # runs of open nodes; each reaches to the bonded nodes on both sides
+            edge = np.flatnonzero(np.diff(np.concatenate([[True], bonded, [True]]).astype(int)))
+            for first, stop in edge.reshape(-1, 2):
+                left, right = max(first - 1, 0), min(stop, len(nodes) - 1)
+                tips = [int(nodes[k]) for k in {left, right} if bonded[k]]
+                total = float(s[right] - s[left])
+                out += [(tip, total / len(tips)) for tip in sorted(tips)] or [(-1, total)]
+        return out
+
+
+def _polylines(ends: Ints) -> list[Ints]:
+    """Corner nodes of a line of facets in order, one array per connected piece."""
+    around: dict[int, list[int]] = {}
+    for a, b in ends.tolist():
+        around.setdefault(a, []).append(b)
+        around.setdefault(b, []).append(a)
+    left = set(around)
+    out = []
+    while left:
+        # begin at an end of the line; a closed line begins anywhere
+        start = min((n for n in left if len(around[n]) == 1), default=min(left))
+        path, here = [start], start
+        left.discard(start)
+        while True:
+            nxt = [n for n in around[here] if n in left]
+            if not nxt:
+                break
+            here = nxt[0]
+            path.append(here)
+            left.discard(here)
+        out.append(np.array(path))
+    return out
+
+
+def _along(path: Ints, x: Array) -> tuple[Ints, Array]:
+    """Nodes of a line and their distance from its beginning."""
+    steps = np.linalg.norm(np.diff(x[path], axis=0), axis=1)
+    return path, np.concatenate([[0.0], np.cumsum(steps)])

@@ -1,0 +1,24 @@
+"""Plots of histories, fronts and deformed meshes.
+
+Importing this package loads matplotlib, so the package ``fxcrack`` imports it on first use only.
+"""
+
+from fxcrack.output.plots.curves import (
+    growth_rows,
+    load_curve,
+    load_opening,
+    r_curve,
+    resistance,
+)
+from fxcrack.output.plots.deformed import deformed
+from fxcrack.output.plots.front_advance import front_advance
+
+__all__ = [
+    "deformed",
+    "front_advance",
+    "growth_rows",
+    "load_curve",
+    "load_opening",
+    "r_curve",
+    "resistance",
+]

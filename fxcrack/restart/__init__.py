@@ -1,0 +1,1 @@
+"""Checkpoints, fingerprints and the restart of a run."""

@@ -1,1 +1,0 @@
-"""solve layer of fxcrack; see the modules."""

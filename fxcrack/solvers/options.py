@@ -1,0 +1,37 @@
+"""Controls of the nonlinear solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fxcrack.base.errors import InputError
+
+
+@dataclass(frozen=True)
+class NewtonOptions:
+    """Controls of the nonlinear iteration.
+
+    Args:
+        tolerance: Residual over the forces in the bodies at which the iteration ends; these are
+            the larger ones of those at the increment's start and those at the iterate, at least
+            round-off of the largest so far.
+        max_iterations: Iterations with a new tangent allowed in one solve.
+        reuse: Iterate with the tangent at hand as long as the residual falls fast with it; else
+            every iteration has its own (Newton's method to the letter, quadratic at the end).
+        balance: Part of the stored energy by which work and energies may be off after one
+            increment; where it is more the increment is divided, down to 1/512 of it. inf takes
+            every increment whole. Not for plasticity and inertia, which count otherwise.
+    """
+
+    tolerance: float = 1e-10
+    max_iterations: int = 25
+    reuse: bool = True
+    balance: float = 1e-5
+
+    def __post_init__(self) -> None:
+        """Check the numbers."""
+        if not (self.tolerance > 0.0 and self.max_iterations >= 1 and self.balance > 0.0):
+            raise InputError(
+                f"NewtonOptions: tolerance = {self.tolerance}, max_iterations = "
+                f"{self.max_iterations} and balance = {self.balance} must be positive"
+            )

@@ -1,0 +1,232 @@
+"""An interface that comes apart: criterion, tips, extent, and who is let go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InputError
+from fxcrack.criteria import (
+    VCCT,
+    CrackLengthVsTime,
+    CrackOpening,
+    CriticalStress,
+    Tabulated,
+)
+from fxcrack.criteria.crack_length_vs_time import LengthEvaluator
+from fxcrack.criteria.crack_opening import OpeningEvaluator
+from fxcrack.criteria.critical_stress import StressEvaluator
+from fxcrack.criteria.energy_release import RateEvaluator
+from fxcrack.criteria.evaluator import Evaluator, TipValues, first_crossing
+from fxcrack.criteria.interface_temperature import given_temperature, scene_temperature
+from fxcrack.criteria.probe import openings
+from fxcrack.equilibrium.cohesive_law import CohesiveUnit
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.crack_extent import CrackExtent
+from fxcrack.interface.surface_paths import SurfacePaths
+from fxcrack.interface.tips import Tips
+from fxcrack.solvers.linear import LinearSolver
+from fxcrack.steps.bond_records import ReleaseRecord, release_records
+from fxcrack.steps.debond import Criterion, Debond, _warn_of_neutral_onset, softens
+
+_TIE = 1e-6
+"""Front nodes whose f lies within this fraction of the largest one are let go together."""
+
+_OVERLAP = 1e-2
+"""Faces that overlap by less than this fraction of how they move on each other are not told of."""
+
+
+class Crack:
+    """A debond on a condensed model.
+
+    Args:
+        solver: The model.
+        p: Number of the pair.
+        debond: Interface and criterion.
+
+    Attributes:
+        n_released: Nodes let go so far.
+        records: What is known of every release, in order.
+        paths: Where tips come from.
+    """
+
+    def __init__(self, solver: LinearSolver, p: int, debond: Debond) -> None:
+        self.solver = solver
+        self.p = p
+        self.title = debond.interface.title
+        self.debond = debond
+        self.criterion = debond.criterion
+        self.unstable_tolerance: float | None = getattr(
+            debond.criterion, "unstable_tolerance", None
+        )
+        self.front = solver.fronts[p]
+        self.extent = CrackExtent(self.front)
+        if isinstance(debond.criterion, VCCT) and softens(debond):
+            _warn_of_neutral_onset(debond.criterion, self.title)
+        self.evaluator: Evaluator = make_evaluator(
+            solver, p, debond.criterion, debond.temperature, softens=softens(debond)
+        )
+        self.watched = [make_evaluator(solver, p, c, debond.temperature) for c in debond.watch]
+        every = [self.evaluator, *self.watched]
+        solver.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
+        self.n_released = 0
+        self.records: list[ReleaseRecord] = []
+        self.paths = SurfacePaths(self.front)
+        self._may_overlap = not debond.interface.contact
+
+    @property
+    def released(self) -> list[tuple[int, float]]:
+        """(node, time) of every release in order."""
+        return [(r.node, r.DBT) for r in self.records]
+
+    def tips(self) -> Tips:
+        """Present front."""
+        return self.front.tips()
+
+    def held(self, tips: Tips) -> bool:
+        """Whether the window holds all that evaluating these tips needs."""
+        if not len(tips):
+            return True
+        needed = [tips.force_nodes.ravel(), tips.wake_nodes.ravel()]
+        needed += [e.needs(tips) for e in (self.evaluator, *self.watched)]
+        return self.solver.holds(self.p, np.concatenate(needed))
+
+    def check_wake(self, tips: Tips) -> None:
+        """Refuse tips whose opening behind cannot be known even in a window made for them.
+
+        Raises:
+            InputError: A support holds the node behind a tip but not its master in the same way.
+        """
+        if getattr(self.criterion, "method", "") != "vcct":
+            return
+        for node, wake in zip(tips.node, tips.wake_nodes, strict=True):
+            if not self.solver.holds(self.p, wake.ravel()):
+                raise InputError(
+                    f"interface '{self.title}': a support holds a node behind the tip at "
+                    f"{format_point(self.front.surface.x[node])} but not its master in the same "
+                    "way, so the opening there cannot be measured; open one more element, take "
+                    "method='closure', or end the support before the crack faces"
+                )
+
+    def evaluate(self, tips: Tips, state: Equilibrium, time: float) -> TipValues:
+        """F at the tips and what is behind it."""
+        if not len(tips):
+            return TipValues(tips, np.zeros(0), {})
+        measured = self.evaluator.measure(tips, state, time)
+        f, report = self.evaluator.value(tips, measured)
+        for other in self.watched:
+            report = {**other.value(tips, other.measure(tips, state, time))[1], **report}
+        return TipValues(tips, f, report, measured, state)
+
+    def look_for_overlap(self, tips: Tips, state: Equilibrium) -> None:
+        """Warn once where faces without contact pass through each other behind a tip."""
+        if not self._may_overlap or not len(tips):
+            return
+        behind = openings(self.solver, self.p, tips, state)
+        size = float(np.abs(behind).max())
+        if size < max(1e-12 * self.front.surface.facet_size, 1e-9 * np.abs(state.jump).max()):
+            return  # round-off
+        i, k = np.unravel_index(np.argmin(behind[..., 0]), behind.shape[:2])
+        if behind[i, k, 0] < -_OVERLAP * size:
+            self._may_overlap = False
+            log.warn(
+                "interface '%s': the open faces overlap behind the tip at %s, by %.3g, and nothing "
+                "keeps them apart; add contact=True to the Interface, or check the sign of the "
+                "loads",
+                self.title,
+                format_point(self.front.surface.x[tips.node[i]]),
+                -behind[i, k, 0],
+            )
+
+    def crossing(
+        self,
+        values: TipValues,
+        a: Equilibrium,
+        b: Equilibrium,
+        times: tuple[float, float],
+        *,
+        upward: bool,
+    ) -> float | None:
+        """First fraction of the linear way from a to b at which the largest f crosses 1."""
+        ends = ((a, times[0]), (b, times[1]))
+        return first_crossing(self.evaluator, values.tips, ends, upward=upward, known=values)
+
+    def ready(self, values: TipValues, level: float = 1.0) -> Ints:
+        """Positions of the tips to let go: the critical one and those tied with it."""
+        if not len(values.f) or values.f.max() < level * (1.0 - 1e-9):
+            return np.zeros(0, dtype=np.int64)
+        return np.flatnonzero(values.f >= values.f.max() * (1.0 - _TIE))
+
+    @property
+    def opening_driven(self) -> bool:
+        """Whether bond forces fall with their opening."""
+        return softens(self.debond)
+
+    def nodes_of(self, values: TipValues, chosen: Ints) -> Ints:
+        """Nodes to let go where some tips are chosen: where bonds soften, by whole units.
+
+        Args:
+            values: What the criterion says at the front.
+            chosen: Positions of tips.
+        """
+        tips = values.tips
+        if self.opening_driven:
+            units = self._by_rates.units(tips)
+            chosen = np.union1d(chosen, np.nonzero(units.shares[np.isin(units.leaders, chosen)])[1])
+        return np.unique(tips.force_nodes[chosen])
+
+    def to_soften(self, nodes: Ints, values: TipValues) -> list[CohesiveUnit]:
+        """Nodes that soften by one law each, and the energy it dissipates until they are free.
+
+        Progressive release: the critical rate at the present mode mix times the area; enhanced
+        VCCT: that of propagation; ramp: half the force times the wake opening at onset.
+        """
+        return self._by_rates.to_soften(nodes, values, self.debond.release)
+
+    @property
+    def _by_rates(self) -> RateEvaluator:
+        assert isinstance(self.evaluator, RateEvaluator)
+        return self.evaluator
+
+    def record(self, nodes: Ints, values: TipValues, state: Equilibrium, time: float) -> None:
+        """Note nodes that are about to be released."""
+        self.n_released += len(nodes)
+        self.records += release_records(self, nodes, values, state, time)
+
+
+def make_evaluator(
+    solver: LinearSolver,
+    p: int,
+    criterion: Criterion,
+    temperature: float | Callable[[Array], npt.ArrayLike] | None = None,
+    *,
+    softens: bool = False,
+) -> Evaluator:
+    """The evaluator that goes with a criterion; collective.
+
+    Raises:
+        InputError: The criterion does not fit the interface, or a temperature is missing or wrong.
+    """
+    pair, continuum = solver.pairs[p], solver.continuum
+    known = given_temperature(pair, continuum.gdim, temperature)
+    if known is None and any(isinstance(v, Tabulated) for v in vars(criterion).values()):
+        known = scene_temperature(pair, continuum)
+    if isinstance(criterion, CrackLengthVsTime):
+        return LengthEvaluator(solver, p, criterion)
+    if not isinstance(criterion, CriticalStress | CrackOpening):
+        return RateEvaluator(solver, p, criterion, known, softens=softens)
+    if known is not None and not known.steady:
+        raise InputError(
+            f"interface '{pair.title}': {type(criterion).__name__} cannot follow a temperature "
+            "that changes in time; give Debond(temperature=...), or a criterion by energy release "
+            "rates"
+        )
+    at_nodes = None if known is None else known(0.0)
+    if isinstance(criterion, CriticalStress):
+        return StressEvaluator(solver, p, criterion, at_nodes)
+    return OpeningEvaluator(solver, p, criterion, at_nodes)

@@ -1,0 +1,76 @@
+"""State of a low-cycle fatigue step at its tips: cycles, accumulated growth, what is reported."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Array, Bools
+
+
+@dataclass(frozen=True)
+class TipCycle:
+    """One stabilised cycle at the tips of an interface.
+
+    Attributes:
+        dG: Range of the total rate, shape (n,), force/length.
+        G_max: Its largest value, likewise.
+        G_c: Critical total rate at the mode mix of G_max, likewise.
+        dadN: Growth per cycle, shape (n,), length: by the Paris law, 0 below the threshold, the
+            whole element beyond the upper limit.
+    """
+
+    dG: Array
+    G_max: Array
+    G_c: Array
+    dadN: Array
+
+
+_COLUMNS = ("N", "interface", "node", "a", "G_max", "dG", "G_c", "dadN", "released")
+
+
+@dataclass
+class FatigueState:
+    """What cycles leave behind for later ones.
+
+    Attributes:
+        N: Cycles so far, over all steps.
+        waiting: Per pair, slave nodes at which onset is still to come, shape (n_nodes,).
+        credit: Per pair, growth within the element of each slave node, shape (n_nodes,), length.
+        table: One entry per tip and stabilised cycle in each column: N and the crack length at
+            its beginning (of the tip in 2-D, the mean of the front in 3-D), what the cycle says
+            there, and whether the tip was let go at its end.
+    """
+
+    N: float = 0.0
+    waiting: dict[int, Bools] = field(default_factory=dict)
+    credit: dict[int, Array] = field(default_factory=dict)
+    table: dict[str, list[float | int | str | bool]] = field(
+        default_factory=lambda: {name: [] for name in _COLUMNS}
+    )
+
+    def meet(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
+        """See a front; the nodes of the first one seen on a pair wait for onset."""
+        if p not in self.waiting:
+            self.waiting[p] = np.zeros(n_nodes, dtype=np.bool_)
+            self.waiting[p][front] = True
+            self.credit[p] = np.zeros(n_nodes)
+
+    def note(
+        self,
+        N: float,
+        interface: str,
+        nodes: npt.NDArray[np.int64],
+        lengths: Sequence[float],
+        cycle: TipCycle,
+        released: Bools,
+    ) -> None:
+        """Add one entry per tip of an interface to every column of the table."""
+        n = len(nodes)
+        rates = [getattr(cycle, name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
+        columns = [[N] * n, [interface] * n, nodes.tolist(), lengths, *rates, released.tolist()]
+        for name, values in zip(_COLUMNS, columns, strict=True):
+            self.table[name] += values

@@ -1,0 +1,245 @@
+"""Bonds that let go with time or over increments: a known fraction of the force remains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.errors import InputError
+from fxcrack.criteria import AmplitudeRelease, RampRelease
+from fxcrack.criteria import Release as ReleaseLaw
+from fxcrack.equilibrium.cohesive_law import CohesiveUnit
+from fxcrack.equilibrium.friction_state import contact_share
+from fxcrack.solvers.linear import LinearSolver
+
+
+@dataclass(frozen=True)
+class PrescribedRamp:
+    """Nodes whose bond force falls with the time, or the increments, since debonding.
+
+    Attributes:
+        p: Number of the pair.
+        nodes: Slave nodes, shape (n,).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        law: The amplitude, or the number of increments.
+        start: Time of debonding, or number of the increment.
+    """
+
+    p: int
+    nodes: Ints
+    force: Array
+    law: AmplitudeRelease | RampRelease
+    start: float
+
+    @classmethod
+    def begin(
+        cls, solver: LinearSolver, p: int, nodes: Ints, law: ReleaseLaw, time: float
+    ) -> PrescribedRamp:
+        """Note the bond forces of nodes that are about to let go."""
+        if not isinstance(law, AmplitudeRelease | RampRelease):
+            raise InputError(f"{type(law).__name__} is no release with time or increments")
+        return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
+
+    @property
+    def by_time(self) -> bool:
+        """Whether time drives it, and not increments."""
+        return self.law.driver == "time"
+
+    def fraction(self, now: float) -> float:
+        """Remaining fraction of the force at a time or an increment."""
+        return float(self.law.remaining(now - self.start))
+
+    def breaks(self) -> tuple[float, ...]:
+        """Times at which the amplitude bends."""
+        if not isinstance(self.law, AmplitudeRelease):
+            return ()
+        return tuple(self.start + t for t in self.law.times)
+
+    def now(self, time: float, increment: int) -> float:
+        """What drives it: the time or the number of the increment."""
+        return time if self.by_time else float(increment)
+
+
+@dataclass
+class ViscousRamp:
+    """Nodes whose release is delayed: damage D_v follows 1 with dD_v/dt = (1 - D_v)/mu.
+
+    The force left is (1 - D_v) F0; one step of implicit Euler per increment multiplies it by
+    mu/(mu + dt).
+
+    Attributes:
+        p: Number of the pair.
+        nodes: Slave nodes, shape (n,).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        viscosity: mu, time.
+        time: Time of the last accepted increment.
+        remaining: Fraction 1 - D_v then.
+    """
+
+    p: int
+    nodes: Ints
+    force: Array
+    viscosity: float
+    time: float
+    remaining: float = 1.0
+    by_time: bool = True
+    start: float = float("nan")
+
+    def fraction(self, now: float) -> float:
+        """Remaining fraction at the end of an increment."""
+        return self.remaining * self.viscosity / (self.viscosity + max(now - self.time, 0.0))
+
+    def accept(self, time: float, solver: LinearSolver) -> None:
+        """Go on from the end of an accepted increment."""
+        self.remaining, self.time = self.fraction(time), time
+
+    def breaks(self) -> tuple[float, ...]:
+        """None: the force is known at increments only."""
+        return ()
+
+    def now(self, time: float, increment: int) -> float:
+        """What drives it: the time."""
+        return time
+
+
+@dataclass
+class ViscousCohesiveRamp:
+    """Nodes whose softening with opening is delayed: D_v follows D = w/w_f.
+
+    dD_v/dt = (D - D_v)/mu; the force left is (1 - D_v) F0. One step of implicit Euler per increment
+    takes D from the end of the one before, so that forces are known when an increment begins:
+    D_v <- (dt D + mu D_v)/(dt + mu). The softening law is met as mu and dt go to zero.
+
+    Attributes:
+        p: Number of the pair.
+        nodes: Slave nodes, shape (n,).
+        unit: Number of the law of each of them, shape (n,).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        final: w_f per law, shape (n_laws,), length.
+        viscosity: mu, time.
+        time: Time of the last accepted increment.
+        damage: D then per law, shape (n_laws,).
+        lagging: D_v then per law, shape (n_laws,).
+    """
+
+    p: int
+    nodes: Ints
+    unit: Ints
+    force: Array
+    final: Array
+    viscosity: float
+    time: float
+    damage: Array
+    lagging: Array
+    by_time: bool = True
+    start: float = float("nan")
+
+    @classmethod
+    def begin(
+        cls,
+        solver: LinearSolver,
+        p: int,
+        units: Sequence[CohesiveUnit],
+        viscosity: float,
+        time: float,
+    ) -> ViscousCohesiveRamp:
+        """Note the bond forces of nodes that are about to soften.
+
+        Args:
+            solver: The model.
+            p: Number of the pair.
+            units: What softens by one law each.
+            viscosity: mu, time.
+            time: Present time.
+        """
+        nodes = np.concatenate([u.nodes for u in units])
+        unit = np.repeat(np.arange(len(units)), [len(u.nodes) for u in units])
+        force, zero = bond_forces_of(solver, p, nodes), np.zeros(len(units))
+        energy = np.array([u.energy for u in units])
+        final = 2.0 * energy / _sizes(force, unit)
+        return cls(p, nodes, unit, force, final, viscosity, time, zero, zero.copy())
+
+    def fraction(self, now: float) -> Array:
+        """Remaining fractions at the end of an increment, shape (n,)."""
+        return np.asarray(1.0 - self._lagging_at(now))[self.unit]
+
+    def _lagging_at(self, now: float) -> Array:
+        dt = max(now - self.time, 0.0)
+        return (dt * self.damage + self.viscosity * self.lagging) / (dt + self.viscosity)
+
+    def damage_at(self, solver: LinearSolver, jump: Array) -> Array:
+        """D of a state, shape (n_laws,): of the largest opening along the force at debonding."""
+        index = solver.index[self.p][self.nodes]
+        at = np.where(index >= 0, jump[np.maximum(index, 0)], 0.0)
+        work = np.bincount(self.unit, (self.force * at).sum(axis=1), len(self.final))
+        opening = -work / _sizes(self.force, self.unit)
+        return np.asarray(np.maximum(self.damage, np.clip(opening / self.final, 0.0, 1.0)))
+
+    def fracture_energy(self, solver: LinearSolver, jump: Array) -> float:
+        """What the law without viscosity has spent up to a state, force times length."""
+        left = 1.0 - self.damage_at(solver, jump)
+        whole = 0.5 * _sizes(self.force, self.unit) * self.final
+        return float(whole @ (1.0 - left**2))
+
+    def accept(self, time: float, solver: LinearSolver) -> None:
+        """Go on from the end of an accepted increment."""
+        self.lagging = self._lagging_at(time)
+        self.damage, self.time = self.damage_at(solver, solver.state.jump), time
+
+    def breaks(self) -> tuple[float, ...]:
+        """None: the force is known at increments only."""
+        return ()
+
+    def now(self, time: float, increment: int) -> float:
+        """What drives it: the time."""
+        return time
+
+
+def _sizes(force: Array, unit: Ints) -> Array:
+    """Norms of the forces of each unit, never quite 0, shape (n_units,)."""
+    square = np.bincount(unit, (force**2).sum(axis=1))
+    return np.maximum(np.sqrt(square), np.finfo(float).tiny)
+
+
+ForceRamp = PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
+"""Bonds whose force is given while they let go."""
+
+_SPENT = 1e-12
+"""Bonds of which less than this fraction of the force is left are free."""
+
+
+def still_pulling(ramps: Sequence[ForceRamp], time: float, increment: int) -> list[ForceRamp]:
+    """Those of some bonds that still carry a force."""
+    return [r for r in ramps if np.any(np.abs(r.fraction(r.now(time, increment))) > _SPENT)]
+
+
+def bond_forces_of(solver: LinearSolver, p: int, nodes: Ints) -> Array:
+    """Forces on the slave side of bonded nodes in jump components, shape (n, gdim).
+
+    With friction, less what contact takes over at once.
+    """
+    index = solver.index[p][nodes]
+    inside = (index >= 0) & ~solver.system.free[np.maximum(index, 0)]
+    force = np.zeros(index.shape)
+    force[inside] = solver.system.forces(solver.state, index[inside])
+    pair = solver.pairs[p]
+    if solver.system.friction is not None and pair.interface.contact:
+        taken, _, _ = contact_share(solver.system, pair, solver.index[p], nodes, solver.state)
+        force[inside] -= taken[inside]
+    return force
+
+
+def given_forces(
+    solver: LinearSolver, ramps: Sequence[ForceRamp], time: float, increment: int
+) -> Array:
+    """Forces that remain at a time and an increment, shape (n_retained,)."""
+    force = np.zeros(solver.system.n_retained)
+    for ramp in ramps:
+        components = solver.index[ramp.p][ramp.nodes]
+        inside = components >= 0
+        left = np.reshape(ramp.fraction(ramp.now(time, increment)), (-1, 1)) * ramp.force
+        force[components[inside]] = left[inside]
+    return force
