@@ -87,7 +87,7 @@ def specimen(
 
 
 def dcb(comm: MPI.Intracomm, *, dx: float = 0.5, ny: int = 4, **options: Any) -> fx.Scene:
-    """The bench problem of reference.md."""
+    """The bench problem of docs/reference-values.md."""
     return specimen(dcb_2d(comm, dx=dx, ny=ny), **options)
 
 

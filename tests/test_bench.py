@@ -90,7 +90,7 @@ def test_opening_and_load_are_those_of_other_programs(dx: float) -> None:
 def test_onset_in_3d_is_that_of_other_programs() -> None:
     result = measured(Problem.make("dcb3d", 1.0))
     assert result["largest_deviation_from_reference"] < 1e-3
-    # node-by-node release carries 11 to 15 % less than a straight front (design.md, section 12)
+    # node-by-node release carries 11 to 15 % less than a straight front (docs/theory.md)
     assert result["beam_theory"]["mean_load_ratio"] == pytest.approx(0.889, abs=0.005)
 
 

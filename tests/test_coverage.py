@@ -1,4 +1,4 @@
-"""The quasi-static table of spec.md, 0.1: each criterion in each model, on any number of ranks."""
+"""Each criterion in each model, on any number of ranks."""
 
 from __future__ import annotations
 

@@ -233,7 +233,7 @@ def test_constant_rate_gives_a_straight_line() -> None:
 
 @pytest.mark.verification
 def test_paris_dcb_under_displacement_control() -> None:
-    # DCB-UD specimen of NASA/CR-2010-216723 (reference.md), corrected beam theory:
+    # DCB-UD specimen of NASA/CR-2010-216723 (docs/reference-values.md), corrected beam theory:
     # G = G0 (ae0/ae)^4, ae = a + chi h,
     # N = N0 + [ae^(4m+1) - ae0^(4m+1)]/(C G0^m ae0^(4m) (4m + 1)); dG = G_max in these numbers.
     E, E2, G13, h, b, u = 139.4e3, 10.16e3, 4.6e3, 1.5, 25.0, 0.67
@@ -258,6 +258,6 @@ def test_paris_dcb_under_displacement_control() -> None:
     np.testing.assert_allclose(n, exact, rtol=1e-5)
 
     at = np.interp([31.0, 32.0, 33.0, 34.0, 35.0], a, n)
-    # Three to four digits in reference.md.
+    # Three to four digits in docs/reference-values.md.
     assert at == pytest.approx([1.545e3, 6.35e3, 2.25e4, 7.51e4, 2.41e5], rel=3e-3)
     assert a[-1] == pytest.approx(37.4, abs=0.05)  # growth stops at the threshold

@@ -1,4 +1,4 @@
-"""Errors, warnings and silent behaviour: every row of spec.md, section 11, in one table.
+"""Errors, warnings and silent behaviour: every documented condition, in one table.
 
 A row is triggered here, or it names the test that does. Rows about keyword decks and explicit
 dynamics are listed with the reason why nothing here can trigger them.

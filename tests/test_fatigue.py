@@ -86,7 +86,7 @@ def test_vcct_sums_the_rate_at_the_beginning_of_each_element():
 
 
 def test_closed_form_is_that_of_the_reference():
-    # reference.md: dG = G_max, E11 as it is, onset at 165; three to four digits
+    # docs/reference-values.md: dG = G_max, E11 as it is, onset at 165; three to four digits
     at = fatigue_dcb.closed_form([30.0, 31.0, 32.0, 33.0, 34.0, 35.0], ratio=0.0)
     assert 165.0 + at[1:] - at[0] == pytest.approx(
         [1.545e3, 6.35e3, 2.25e4, 7.51e4, 2.41e5], rel=3e-3

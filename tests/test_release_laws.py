@@ -334,7 +334,7 @@ def test_front_in_3d_keeps_its_energy_only_with_progressive_release():
     step.close()
     gradual, right = front3d.run(fx.ProgressiveRelease(), until=50.0)
     gradual.close()
-    # design.md section 12: step release carries 11 to 15 % less and spends 0.108 to 0.16
+    # docs/theory.md: step release carries 11 to 15 % less and spends 0.108 to 0.16
     assert 0.84 < found["load / theory"] < 0.90
     assert found["dissipated"] < 0.17
     # progressive: G_c within 1.5 %; the coarse mesh is up to 6 % too stiff

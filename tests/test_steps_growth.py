@@ -53,7 +53,7 @@ CARBON = fx.Orthotropic(
     ],
 )
 def test_bench_dcb(dx: float, ny: int, curve: dict[int, tuple[float, float]]) -> None:
-    """Opening and load of reference.md, of which several programs agree to 1.5e-4."""
+    """Opening and load on which several programs agree to 1.5e-4 (docs/reference-values.md)."""
     scene = dcb(MPI.COMM_SELF, dx=dx, ny=ny)
     history = grow_to(scene, 60.0 + dx)
     for a, expected in curve.items():
@@ -68,7 +68,7 @@ def test_bench_dcb(dx: float, ny: int, curve: dict[int, tuple[float, float]]) ->
 
 
 def test_bench_dcb_3d() -> None:
-    """Onset at the load of reference.md, in the middle of the width."""
+    """Onset in the middle of the width, at the load of docs/reference-values.md."""
     scene = dcb3(MPI.COMM_SELF)
     history = scene.run(fx.Static(until=fx.Releases(3)))
     first = onsets(history)[0]

@@ -60,7 +60,7 @@ def test_three_ways_to_say_the_same(kind: str) -> None:
     """A function of position, a value per slave node, a table against a field of temperature."""
     by_place = grown(kind, tough)
     others = [grown(kind, HEAT, warm)]
-    if kind != "enhanced":  # which spec.md, 1.4, leaves without values per node
+    if kind != "enhanced":  # for which values per node are not defined
         others.append(grown(kind, per_node()))
     for other in others:
         assert_same(by_place.history, other.history, 1e-12)

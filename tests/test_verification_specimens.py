@@ -1,4 +1,4 @@
-"""Specimens with closed forms or published results; see reference.md.
+"""Specimens with closed forms or published results; see docs/reference-values.md.
 
 Corrected beam theory is for beams: laminates in plane stress come within half a per cent of it,
 in plane strain E/(1 - nu12 nu21) makes another half.

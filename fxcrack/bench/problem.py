@@ -33,7 +33,7 @@ LENGTHS = (30.0, 45.0, 60.0)
 _E, _NU, _GC = 70e3, 0.3, 0.2
 _HEIGHT, _WIDTH = 1.5, 20.0
 
-# opening and load at onset, by name, dx and elements per arm height; reference.md
+# opening and load at onset, by name, dx and elements per arm height; docs/reference-values.md
 _REFERENCE: dict[tuple[str, float, int], dict[float, tuple[float, float]]] = {
     ("dcb2d", 0.5, 4): {30.0: (1.8893, 2.1826), 60.0: (7.3327, 1.1079)},
     ("dcb2d", 0.25, 8): {30.0: (1.9303, 2.1386), 60.0: (7.4835, 1.0862)},
