@@ -86,7 +86,7 @@ def tie(slave: str, master: str, **options: object) -> fx.Interface:
     return fx.Interface(slave=slave, master=master, bonded=everything, **options)
 
 
-# -- rules of the jump coordinates (docs/theory.md) -------------------------------------------------
+# -- rules of the jump coordinates (docs/theory.md) ---------------------------------------------
 
 
 @pytest.mark.mpi

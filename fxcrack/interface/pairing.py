@@ -294,7 +294,8 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
             f"{where}: {int(lost.sum())} bonded slave nodes lie outside the master surface "
             f"'{interface.master}', the farthest at {format_point(slave.x[i])} by "
             f"{foot.distance[i]:.3g} (search tolerance {tolerance:.3g}); let the master "
-            "surface extend under them, take them out of the bonded set, or raise Interface(tolerance=...)"
+            "surface extend under them, take them out of the bonded set, or raise "
+            "Interface(tolerance=...)"
         )
     normals = np.where(slave.order >= 1, -slave.normals, 0.0)
     gap = np.einsum("ni,ni->n", slave.x - foot.foot, normals)
