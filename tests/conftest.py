@@ -17,6 +17,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # ranks share the cores
 os.environ.setdefault("MPLBACKEND", "Agg")
 
 import faulthandler
+import fnmatch
 import gc
 import sys
 import time
@@ -138,6 +139,26 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     plugins = session.config.pluginmanager
     if terminal := plugins.getplugin("terminalreporter"):
         plugins.register(FailuresAtOnce(terminal))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pycollect_makeitem(
+    collector: pytest.Collector,
+) -> Generator[None, object, object]:
+    """Mark as slow what the mark "quick" of a test leaves out."""
+    made = yield
+    items = [i for i in made if isinstance(i, pytest.Item)] if isinstance(made, list) else []
+    quick = items[0].get_closest_marker("quick") if items else None
+    if quick is None:
+        return made
+    names = [item.name.partition("[")[2].removesuffix("]") for item in items]
+    for pattern in quick.args:
+        if not fnmatch.filter(names, pattern):
+            raise collector.CollectError(f"quick: {pattern!r} is none of {', '.join(names)}")
+    for item, name in zip(items, names, strict=True):
+        if not any(fnmatch.fnmatchcase(name, pattern) for pattern in quick.args):
+            item.add_marker("slow")
+    return made
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -200,6 +200,7 @@ def test_suite() -> None:
     assert [(c.dofs, c.ranks) for c in cases] == [(1e4, 2), (3e4, 2)] * 2
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_both_methods_measure_the_same_crack(comm: MPI.Intracomm) -> None:
     direct, iterative = (measure(Case("block", 1500, m), comm) for m in ("schur", "iterative"))

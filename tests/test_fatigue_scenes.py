@@ -98,6 +98,7 @@ def pressed(comm: Any = MPI.COMM_WORLD) -> fx.Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_loads_out_of_step_with_contact_equal_their_sampled_cycle(comm):
     scene = pressed(comm)

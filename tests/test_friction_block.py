@@ -175,6 +175,7 @@ def test_the_path_in_the_plane_keeps_the_laws_and_the_energy(seed: int, m: int) 
     assert work == pytest.approx(energy + taken, abs=1e-11 * (1.0 + energy + taken))
 
 
+@pytest.mark.quick("1-2")
 @pytest.mark.parametrize(("seed", "m"), [(1, 2), (13, 4), (25, 6)])
 def test_the_path_in_space_keeps_the_laws_and_the_energy(seed: int, m: int) -> None:
     work, energy, taken = legs(seed, m, 3)

@@ -47,6 +47,7 @@ def test_nodes_of_the_surface_have_one_master(kind: str, order: int, warp: objec
     assert np.all(found.distance == 0.0)
 
 
+@pytest.mark.quick("interval-*", "quadrilateral-*")
 @pytest.mark.parametrize(("kind", "order"), KINDS)
 @settings(max_examples=30)
 @given(points=arrays(np.float64, (20, 3), elements=st.floats(-0.4, 2.4)))

@@ -35,6 +35,7 @@ def inflated(maximum: float) -> tuple[fx.Scene, Row]:
     return scene, onsets(history)[0]
 
 
+@pytest.mark.slow
 def test_follower_pressure_in_one_increment_or_in_many() -> None:
     """The first whole step alone knows of the new pressure; a failed trial leaves none behind."""
     (one, coarse), (_, fine) = inflated(1.0), inflated(0.05)

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
+@pytest.mark.smoke
 def test_every_subpackage_is_installed() -> None:
     top = Path(fxcrack.__file__).parent
     found = {

@@ -66,6 +66,8 @@ CASES = {
 }
 
 
+@pytest.mark.three
+@pytest.mark.quick("a quarter", "one line")
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", CASES)
 def test_schur_complement(comm: MPI.Intracomm, case: str) -> None:
@@ -141,6 +143,7 @@ MESHES = {
 }
 
 
+@pytest.mark.quick("2-D")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", MESHES)
 def test_columns_give_the_same(comm: MPI.Intracomm, name: str) -> None:
@@ -183,6 +186,7 @@ def test_support_whose_nodes_are_all_held_already(comm: MPI.Intracomm) -> None:
 # -- what MUMPS reports ----------------------------------------------------------------------------
 
 
+@pytest.mark.quick("slides-schur", "3-D-columns")
 @pytest.mark.mpi
 @pytest.mark.parametrize("method", ["schur", "columns"])
 @pytest.mark.parametrize(

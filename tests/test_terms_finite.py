@@ -160,6 +160,7 @@ def test_uniaxial_svk_in_plane_stress(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_materials_side_by_side(comm: MPI.Intracomm) -> None:
     """Each law in its own cells: the energies add up, the names too."""
@@ -182,6 +183,7 @@ def test_materials_side_by_side(comm: MPI.Intracomm) -> None:
     both.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_inflated_ring(comm: MPI.Intracomm) -> None:
     """A ring that grows and lengthens uniformly: F = diag(b, l, b)."""
@@ -209,6 +211,7 @@ def test_plane_stress_is_refused(comm: MPI.Intracomm) -> None:
         fx.NeoHookean(E, 0.5)
 
 
+@pytest.mark.three
 @pytest.mark.mpi
 def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> None:
     """The bodies on all ranks and on this rank alone."""

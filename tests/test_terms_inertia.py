@@ -119,6 +119,7 @@ def exact_tip(bodies: Bodies, effect: fx.Inertia, time: float) -> float:
     return float(u[2 * tip])
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.verification
 def test_bar_vibrates_at_its_frequency(comm: MPI.Intracomm) -> None:
@@ -265,6 +266,7 @@ def test_tangent_is_assembled_once_per_length_of_the_increment(comm: MPI.Intraco
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     bodies = moving(comm, fx.Inertia(rayleigh=(0.1, 0.01)), nu=0.3, finite=True)
@@ -280,6 +282,7 @@ def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     effect = with_velocity(fx.Inertia(rayleigh=(0.1, 0.0)))

@@ -160,6 +160,7 @@ def test_plane_strain_is_a_held_solid(comm: MPI.Intracomm) -> None:
     assert forces[0] == pytest.approx(forces[1], rel=1e-8)  # Newton stops at 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_energy_balance_is_exact(comm: MPI.Intracomm) -> None:
     """Work of the ends by the trapezoidal rule = elastic energy + plastic work, cycle included."""
@@ -203,6 +204,7 @@ def test_clamped_bar_is_cooled_beyond_yield(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_beside_elastic_cells_and_restored(comm: MPI.Intracomm) -> None:
     mesh = box(comm, "plane strain")

@@ -214,6 +214,7 @@ def test_taylor(comm: MPI.Intracomm, kind: str) -> None:
         bodies.destroy()
 
 
+@pytest.mark.quick("linear")
 @pytest.mark.mpi
 @pytest.mark.verification
 @pytest.mark.parametrize("path", ["linear", "finite"])

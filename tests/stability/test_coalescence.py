@@ -45,6 +45,7 @@ def island(comm: MPI.Intracomm, order: int, release: fx.Step | fx.Progressive) -
     )
 
 
+@pytest.mark.quick("1-softening", "2-at once")
 @pytest.mark.mpi
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("order", [1, 2])

@@ -135,6 +135,7 @@ def test_jump_of_the_load(width: float) -> None:
     assert end["released_energy"] == pytest.approx(other["released_energy"], rel=1e-6)
 
 
+@pytest.mark.quick("*-event", "1.0-increment")
 @pytest.mark.parametrize("stepping", ["event", "increment"])
 @pytest.mark.parametrize("turn", [0.9, 1.0, 1.1])
 def test_load_turns_before_at_and_after_release(turn: float, stepping: str) -> None:
