@@ -19,6 +19,7 @@ os.environ.setdefault("MPLBACKEND", "Agg")
 import faulthandler
 import fnmatch
 import gc
+import signal
 import sys
 import time
 from collections.abc import Generator, Iterator
@@ -38,6 +39,10 @@ from fxcrack.abort import end_all
 # Same examples on every rank and in every run; compilation of forms makes first examples slow.
 hypothesis.settings.register_profile("fxcrack", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("fxcrack")
+
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # A shell gave it to a job in the background; tests send it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 WORLD = MPI.COMM_WORLD
 PATIENCE = 30.0  # seconds a failed rank waits for the others: longer than compiling a form

@@ -235,6 +235,7 @@ def test_dense_rates() -> None:
     assert all(v > 0.0 for v in dense_rate(200).values())
 
 
+@pytest.mark.slow
 def test_more_work_takes_longer() -> None:
     few, many = (unshared_rate(MPI.COMM_SELF, n) for n in (100_000, 10_000_000))
     assert many["memory"] > 5.0 * few["memory"] > 0.0

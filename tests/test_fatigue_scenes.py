@@ -304,6 +304,7 @@ def test_a_front_in_3d_stays_symmetric_and_keeps_its_energy():
         scene.close()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_ranks_agree(comm):
     for make, step in (

@@ -160,6 +160,7 @@ def test_faces_that_slide_keep_the_energy_balance() -> None:
     assert 0.0 < taken[1] < 0.65 * taken[0]
 
 
+@pytest.mark.slow
 def test_so_do_faces_that_slide_with_inertia() -> None:
     _, history = slid(MPI.COMM_SELF, 2.0, 0.05, fx.Inertia(density=1e-3))
     assert history.rows[-1]["pairing_energy"] > 0.0

@@ -45,6 +45,7 @@ CARBON = fx.Orthotropic(
 # -- numbers of other programs ---------------------------------------------------------------------
 
 
+@pytest.mark.quick("0.5-4-curve0")
 @pytest.mark.parametrize(
     ("dx", "ny", "curve"),
     [
@@ -67,6 +68,7 @@ def test_bench_dcb(dx: float, ny: int, curve: dict[int, tuple[float, float]]) ->
     scene.close()
 
 
+@pytest.mark.slow
 def test_bench_dcb_3d() -> None:
     """Onset at the load of reference.md, in the middle of the width."""
     scene = dcb3(MPI.COMM_SELF)

@@ -81,6 +81,7 @@ def march(bodies: Bodies, dt: float, steps: int) -> Array:
     return np.array([max(v) for v in zip(*c.comm.allgather(out), strict=True)])
 
 
+@pytest.mark.quick("hht")
 @pytest.mark.parametrize("method", METHODS)
 def test_order_in_the_increment(comm: MPI.Intracomm, method: str) -> None:
     """Half a period of one discrete motion: the error falls with the square of the increment."""
@@ -155,6 +156,7 @@ def test_energies(comm: MPI.Intracomm, method: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 def test_rayleigh_damping(comm: MPI.Intracomm) -> None:
     """One motion decays with ratio (r_M/w + r_K w)/2; the energy it loses is counted."""
     for rayleigh in ((0.4, 0.0), (0.0, 0.02), (0.3, 0.01)):
@@ -225,6 +227,7 @@ def test_spectral_radius(method: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane *", "ring-False")
 @pytest.mark.parametrize("lumped", [False, True])
 @pytest.mark.parametrize("model", MODELS)
 def test_mass(comm: MPI.Intracomm, model: str, lumped: bool) -> None:

@@ -76,6 +76,7 @@ def stress_of(strain: float, material: fx.Plastic) -> float:
     return s
 
 
+@pytest.mark.quick("ring-*")
 @pytest.mark.parametrize(
     "material",
     [METAL, fx.Plastic(E, NU, hardening=TABLE), fx.Plastic(E, NU, yield_stress=Y)],
@@ -105,6 +106,7 @@ def test_uniaxial(comm: MPI.Intracomm, model: str, material: fx.Plastic) -> None
     bodies.destroy()
 
 
+@pytest.mark.quick("plane strain-*", "ring-1", "solid-1")
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("model", ["plane strain", "ring", "solid"])
 def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:

@@ -37,6 +37,7 @@ def pressed(
     return continuum, Bodies(continuum, [FollowerPressure(continuum, load)])
 
 
+@pytest.mark.quick("plane *", "solid-1")
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("model", MODELS)
 def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:
@@ -55,6 +56,7 @@ def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane strain")
 @pytest.mark.parametrize("model", ["plane strain", "solid"])
 def test_force_turns_with_the_body(comm: MPI.Intracomm, model: str) -> None:
     """A rotated and stretched block: -p times the deformed area along the deformed normal."""

@@ -72,6 +72,7 @@ def test_tolerance_that_needs_more_cutbacks_than_allowed() -> None:
 # -- increments ------------------------------------------------------------------------------------
 
 
+@pytest.mark.quick("True-*")
 @pytest.mark.parametrize("factor", [1e-9, 1e-3, 1e3, 1e9])
 @pytest.mark.parametrize("contact", [False, True])
 def test_first_increment_far_off(factor: float, contact: bool) -> None:
