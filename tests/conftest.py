@@ -51,8 +51,8 @@ PATIENCE = 30.0  # seconds a failed rank waits for the others: longer than compi
 OUTCOMES = WORLD.Dup()
 
 LIMITS = {"quick": 120.0, "slow": 600.0}
-"""Seconds one test may take: ten times what the longest ones need, so that a busy machine passes.
-FXCRACK_TEST_PATIENCE, a number, multiplies them on machines that are slower still."""
+"""Seconds one test may take: ten times what the longest ones need. They grow with the load of the
+machine; FXCRACK_TEST_PATIENCE, a number, multiplies them on one that is slow by itself."""
 
 
 class Watchdog:
@@ -77,9 +77,10 @@ class Watchdog:
     def start(self, item: pytest.Item) -> None:
         """Give the test all of its time."""
         kind = "slow" if item.get_closest_marker("slow") else "quick"
-        limit = LIMITS[kind] * self.patience
+        load = os.getloadavg()[0] / (os.cpu_count() or 1)
+        limit = LIMITS[kind] * self.patience * max(1.0, load)
         if self._named:
-            self._write(f"{item.nodeid} - cut short on rank {WORLD.rank}, limit {limit:g} s\n")
+            self._write(f"{item.nodeid} - cut short on rank {WORLD.rank}, limit {limit:.3g} s\n")
         faulthandler.dump_traceback_later(limit, exit=True, file=self._file)
 
     def stop(self) -> None:
