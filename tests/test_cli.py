@@ -31,7 +31,7 @@ def run_on_two_ranks(program: str) -> subprocess.CompletedProcess[str]:
         [ROOT / ".ci" / "mpirun", *"-n 2 python3 -c".split(), program],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 

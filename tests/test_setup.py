@@ -66,7 +66,7 @@ def run_on_two_ranks(
         env={**os.environ, "FXCRACK_TESTS_RUNNING": str(folder), **environment},
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 
