@@ -15,7 +15,6 @@ import numpy as np
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import ComesApart, InputError
-from fxcrack.criteria import StepRelease
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -157,11 +156,7 @@ class StepDriver:
             spent = float(force @ here.jump[index] - last @ point.jump[index])
             spent += float((last - force) @ mean[index])
             self._by_force += spent
-            if isinstance(ramp, ViscousRamp):
-                self.viscous += spent
-            elif isinstance(ramp, ViscousCohesiveRamp):
-                law = [ramp.fracture_energy(self.solver, s.jump) for s in (here, point)]
-                self.viscous += spent - (law[1] - law[0])
+            self.viscous += ramp.viscous_part(spent, self.solver, here.jump, point.jump)
         self.solver.state = point
         self.time = time
 
@@ -194,7 +189,7 @@ class StepDriver:
 
     def _open(self, g: Crack, nodes: Ints, values: TipValues) -> None:
         law = g.debond.release
-        viscosity = getattr(g.criterion, "viscosity", 0.0)
+        viscosity = g.criterion.viscosity
         ramp: ForceRamp | None = None
         if g.opening_driven:
             units = g.to_soften(nodes, values)
@@ -202,7 +197,7 @@ class StepDriver:
                 ramp = ViscousCohesiveRamp.begin(self.solver, g.p, units, viscosity, self.time)
             else:
                 self.solver.soften(g.p, units)
-        elif not isinstance(law, StepRelease):
+        elif law.driver != "once":
             now = self.time if law.driver == "time" else float(self.increment)
             ramp = PrescribedRamp.begin(self.solver, g.p, nodes, law, now)
         elif viscosity > 0.0:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import InputError
-from fxcrack.criteria import AmplitudeRelease, RampRelease
-from fxcrack.criteria import Release as ReleaseLaw
+from fxcrack.criteria import ReleaseLaw
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.friction_state import contact_share
 from fxcrack.solvers.linear import LinearSolver
@@ -31,7 +30,7 @@ class PrescribedRamp:
     p: int
     nodes: Ints
     force: Array
-    law: AmplitudeRelease | RampRelease
+    law: ReleaseLaw
     start: float
 
     @classmethod
@@ -39,8 +38,6 @@ class PrescribedRamp:
         cls, solver: LinearSolver, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> PrescribedRamp:
         """Note the bond forces of nodes that are about to let go."""
-        if not isinstance(law, AmplitudeRelease | RampRelease):
-            raise InputError(f"{type(law).__name__} is no release with time or increments")
         return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
 
     @property
@@ -54,9 +51,19 @@ class PrescribedRamp:
 
     def breaks(self) -> tuple[float, ...]:
         """Times at which the amplitude bends."""
-        if not isinstance(self.law, AmplitudeRelease):
-            return ()
-        return tuple(self.start + t for t in self.law.times)
+        return tuple(self.start + t for t in self.law.breaks()) if self.by_time else ()
+
+    @property
+    def suggested_increment(self) -> float:
+        """Increment suggested for the first one after debonding, time."""
+        return self.law.suggested_increment
+
+    def accept(self, time: float, solver: LinearSolver) -> None:
+        """Nothing: the fraction depends on what has passed since debonding alone."""
+
+    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+        """Part of the energy spent between two states that viscosity took: none."""
+        return 0.0
 
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time or the number of the increment."""
@@ -88,9 +95,15 @@ class ViscousRamp:
     by_time: bool = True
     start: float = float("nan")
 
+    suggested_increment: ClassVar[float] = float("inf")
+
     def fraction(self, now: float) -> float:
         """Remaining fraction at the end of an increment."""
         return self.remaining * self.viscosity / (self.viscosity + max(now - self.time, 0.0))
+
+    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+        """Part of the energy spent between two states that viscosity took: all of it."""
+        return spent
 
     def accept(self, time: float, solver: LinearSolver) -> None:
         """Go on from the end of an accepted increment."""
@@ -136,6 +149,8 @@ class ViscousCohesiveRamp:
     lagging: Array
     by_time: bool = True
     start: float = float("nan")
+
+    suggested_increment: ClassVar[float] = float("inf")
 
     @classmethod
     def begin(
@@ -183,6 +198,20 @@ class ViscousCohesiveRamp:
         left = 1.0 - self.damage_at(solver, jump)
         whole = 0.5 * _sizes(self.force, self.unit) * self.final
         return float(whole @ (1.0 - left**2))
+
+    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+        """Part of the energy spent between two states that viscosity took.
+
+        It is what the law without viscosity would not have spent.
+
+        Args:
+            spent: Energy spent, force times length.
+            solver: The model.
+            here: Jumps of the first state, shape (n_retained,).
+            there: Jumps of the second state, likewise.
+        """
+        law = [self.fracture_energy(solver, jump) for jump in (here, there)]
+        return spent - (law[1] - law[0])
 
     def accept(self, time: float, solver: LinearSolver) -> None:
         """Go on from the end of an accepted increment."""

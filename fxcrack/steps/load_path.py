@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.errors import ComesApart, InputError
-from fxcrack.criteria import CrackLengthVsTime
 from fxcrack.equilibrium.contact import Equilibrium, blend
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.steps.driver import LARGE, StepDriver
@@ -117,14 +116,14 @@ class LoadPath(StepDriver):
         """
         if self.breaks or self.solver.system.soft.bonds or self.time <= 0.0:
             return False
-        by_load = not any(isinstance(g.criterion, CrackLengthVsTime) for g in self.cracks)
+        by_load = all(g.criterion.depends_on_load for g in self.cracks)
         released = any(g.n_released for g in self.cracks)
         return by_load and released and max(self._largest()) < 1e-8
 
     def _next_guess(self) -> float:
         """A time a little after the one at which f would reach 1 under a proportional load."""
         largest = [
-            v.f.max(initial=0.0) ** (1.0 / g.evaluator.degree)
+            v.f.max(initial=0.0) ** (1.0 / g.degree)
             for g, v in zip(self.cracks, self._values, strict=True)
             if v.f.max(initial=0.0) > 0.0
         ]
@@ -135,9 +134,7 @@ class LoadPath(StepDriver):
     def _curves_have_ended(self) -> bool:
         """Whether growth follows curves of time alone, which end before the step does."""
         ends = [
-            getattr(g.evaluator, "ends", np.inf)
-            for g, v in zip(self.cracks, self._values, strict=True)
-            if len(v.tips)
+            g.evaluator.ends for g, v in zip(self.cracks, self._values, strict=True) if len(v.tips)
         ]
         if not ends or max(ends) > self.time:
             return False

@@ -46,9 +46,7 @@ class NewtonLoadPath(QuasiStaticDriver):
                 "bodies in time; use a Dynamic step, or leave Inertia out"
             )
         self.solver.exact = any(
-            getattr(c, "method", "") == "closure"
-            for g in self.cracks
-            for c in (g.debond.criterion, *g.debond.watch)
+            c.needs_exact_S for g in self.cracks for c in (g.debond.criterion, *g.debond.watch)
         )
         return super().run()
 
@@ -225,7 +223,7 @@ class NewtonLoadPath(QuasiStaticDriver):
         """Time between the present one and one at which f was beyond 1, near f = 1."""
         far, level = beyond
         present = max(self._largest())
-        degree = max(g.evaluator.degree for g in self.cracks)
+        degree = max(g.degree for g in self.cracks)
         a, b = present ** (1.0 / degree) - 1.0, level ** (1.0 / degree) - 1.0
         secant = self.time - a * (far - self.time) / (b - a)
         low, high = sorted((self.time, far))

@@ -13,7 +13,6 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.errors import ComesApart, ConvergenceError, InputError, unknown_name
-from fxcrack.criteria import AmplitudeRelease, RampRelease, RateCriterion
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -21,7 +20,6 @@ from fxcrack.history import Row
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.driver import LARGE
-from fxcrack.steps.force_ramps import PrescribedRamp
 from fxcrack.steps.increment_stepping import IncrementControl, TooManyCutbacks
 from fxcrack.steps.load_path import BEYOND, LoadPath
 
@@ -63,23 +61,18 @@ class QuasiStaticDriver(LoadPath):
     def run(self) -> str:
         """March until an end condition holds; returns why the step ended."""
         for g in self.cracks:
-            law = g.debond.release
-            if (
-                isinstance(law, RampRelease)
-                and law.increments
-                and self.step.stepping != "increment"
-            ):
+            viscosity, law = g.criterion.viscosity, g.debond.release
+            over_increments = law.driver == "increments"
+            if over_increments and self.step.stepping != "increment":
                 raise InputError(
-                    f"interface '{g.title}' lets go over {law.increments} increments, which "
+                    f"interface '{g.title}' is released by {law} over increments, which "
                     f"stepping='{self.step.stepping}' does not have; use stepping='increment', "
                     "or a ramp with the opening (no number of increments)"
                 )
-            viscosity = getattr(g.criterion, "viscosity", 0.0)
-            if viscosity > 0.0 and isinstance(law, RampRelease) and law.increments:
+            if viscosity > 0.0 and over_increments:
                 raise InputError(
                     f"interface '{g.title}': viscosity delays a release at once or with the "
-                    f"opening, not one over {law.increments} increments; use viscosity=0 or "
-                    "another release"
+                    f"opening, not {law} over increments; use viscosity=0 or another release"
                 )
             if viscosity > 0.0 and self.step.stepping != "increment":
                 raise InputError(
@@ -243,8 +236,7 @@ class QuasiStaticDriver(LoadPath):
             self._values = values
             self.solver.commit()
             for ramp in self._ramps:
-                if not isinstance(ramp, PrescribedRamp):
-                    ramp.accept(self.time, self.solver)
+                ramp.accept(self.time, self.solver)
             self._record("increment")
             if not smallest:
                 control.accepted()
@@ -261,7 +253,7 @@ class QuasiStaticDriver(LoadPath):
         if beta is None or self.time <= 0.0 or any(g.n_released for g in self.cracks):
             return 0.0
         reach = [
-            float(v.f.max()) ** (-1.0 / g.evaluator.degree)
+            float(v.f.max()) ** (-1.0 / g.degree)
             for g, v in zip(self.cracks, self._values, strict=True)
             if v.f.max(initial=0.0) > 0.0
         ]
@@ -276,17 +268,15 @@ class QuasiStaticDriver(LoadPath):
 
     def _first_increment(self) -> float:
         """Increment suggested after nodes have just begun to let go, inf without a suggestion."""
-        timed = [r for r in self._ramps if isinstance(r, PrescribedRamp)]
-        laws = [r.law for r in timed if r.by_time and r.start == self.time]
         return min(
-            (x.suggested_increment for x in laws if isinstance(x, AmplitudeRelease)),
+            (r.suggested_increment for r in self._ramps if r.by_time and r.start == self.time),
             default=np.inf,
         )
 
     def _upper(self, g: Crack) -> float:
-        upper = 1.0 + g.criterion.tolerance
-        if g.unstable_tolerance is not None and g.n_released:
-            upper = max(upper, 1.0 + g.unstable_tolerance)
+        upper, unstable = g.criterion.release_range[1], g.criterion.unstable_tolerance
+        if unstable is not None and g.n_released:
+            upper = max(upper, 1.0 + unstable)
         return upper
 
     def _met_at_start(self) -> list[bool]:
@@ -297,7 +287,7 @@ class QuasiStaticDriver(LoadPath):
         back could not make it smaller.
         """
         return [
-            not isinstance(g.criterion, RateCriterion)
+            g.criterion.smallest_increment_when_met
             and bool(v.f.max(initial=0.0) >= g.criterion.release_range[0])
             for g, v in zip(self.cracks, self._values, strict=True)
         ]
@@ -327,7 +317,7 @@ class QuasiStaticDriver(LoadPath):
     def _may_run_on(self) -> bool:
         """Whether more nodes may go at this load: within the unstable growth tolerance."""
         over = [
-            (float(v.f.max(initial=0.0)), g.unstable_tolerance)
+            (float(v.f.max(initial=0.0)), g.criterion.unstable_tolerance)
             for g, v in zip(self.cracks, self._values, strict=True)
             if v.f.max(initial=0.0) >= g.criterion.release_range[0]
         ]
