@@ -203,10 +203,10 @@ class LengthEvaluator(Evaluator):
         self._slot = np.zeros(surface.n_nodes, dtype=np.int64)
         if criterion.moving and len(initial):
             self._followed.append(solver.follow(solver.continuum.owned_nodes(criterion.reference)))
-            gdim, n_local = solver.continuum.gdim, solver.continuum.n_local
-            for block in surface.dofs[initial] - solver.continuum.offset // gdim:
-                here = np.array([block]) if 0 <= block < n_local // gdim else np.zeros(0, dtype=int)
-                self._followed.append(solver.follow(here))
+            layout = solver.continuum.layout
+            for node in surface.dofs[initial]:
+                here = np.array([node])[: int(layout.is_owned(node))]
+                self._followed.append(solver.follow(layout.to_local(here)))
             self._slot[initial] = 1 + np.arange(len(initial))
         stuck = initial[~self._starts[initial]]
         if len(stuck):

@@ -16,7 +16,7 @@ from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import AmplitudeLike
-from fxcrack.interface.nodes import NodeValues
+from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 
 Given = float | Callable[[Array], npt.ArrayLike] | None
@@ -81,12 +81,11 @@ def scene_temperature(pair: Pair, continuum: Continuum) -> InterfaceTemperature 
     field = continuum.temperature
     if field is None:
         return None
-    reader = NodeValues(continuum, pair.surface.dofs)
-    rows = reader.find(pair.surface.dofs)
+    nodes = InterfaceNodes(continuum.layout, pair.surface.dofs)
+    rows = nodes.find(pair.surface.dofs)
 
     def at_nodes(values: Array) -> Array:
-        owned = np.repeat(values, continuum.gdim)[: continuum.n_local]
-        return np.asarray(reader.gather(owned)[rows, 0])
+        return np.asarray(nodes.share(values[nodes.local])[rows])
 
     patterns = np.array([at_nodes(p) for p in field.nodal_patterns(continuum.space)])
     base = np.full(len(rows), field.effect.reference)

@@ -19,9 +19,9 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from fxcrack.base.arrays import Array, Ints
-from fxcrack.continuum.continuum import Continuum
+from fxcrack.base.arrays import Array
 from fxcrack.criteria.evaluator import TipValues
+from fxcrack.interface.nodes import InterfaceNodes, point_displacements
 from fxcrack.steps.bond_records import bond_state
 
 if TYPE_CHECKING:
@@ -76,25 +76,6 @@ def residual(scene: Scene, u: fem.Function) -> Array:
     return values
 
 
-def _shared(continuum: Continuum, blocks: Ints, owned: Array) -> Array:
-    """Values of global displacement nodes on every rank, shape (n_blocks, gdim); collective.
-
-    Args:
-        continuum: Displacement space.
-        blocks: Global nodes, sorted, the same on every rank.
-        owned: Values of the owned dofs, shape (n_local,).
-    """
-    gdim = continuum.gdim
-    low, count = continuum.offset // gdim, continuum.n_local // gdim
-    mine = np.flatnonzero((blocks >= low) & (blocks < low + count))
-    out = np.zeros((len(blocks), gdim))
-    for where, what in continuum.comm.allgather(
-        (mine, owned.reshape(-1, gdim)[blocks[mine] - low])
-    ):
-        out[where] = what
-    return out
-
-
 def in_space(values: Array) -> Array:
     """Vectors with three components, shape (n, gdim) to (n, 3)."""
     return np.pad(values, ((0, 0), (0, 3 - values.shape[1])))
@@ -111,12 +92,11 @@ def interface_fields(
         time: Time of the present state; that of the scene by default.
     """
     continuum, pairs = scene.continuum, scene.pairs
-    used = [np.concatenate([p.surface.dofs, p.masters.ravel()]) for p in pairs]
-    blocks = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
-    motion = _shared(continuum, blocks, u.x.array[: continuum.n_local])
-    direct = _shared(continuum, blocks, residual(scene, u))
-    slaves = [np.searchsorted(blocks, p.surface.dofs) for p in pairs]
-    masters = [np.searchsorted(blocks, p.masters) for p in pairs]
+    nodes, gdim = InterfaceNodes.of_pairs(continuum.layout, pairs), continuum.gdim
+    motion = nodes.gather(u.x.array[: continuum.n_local])
+    direct = nodes.gather(residual(scene, u))
+    slaves = [nodes.find(p.surface.dofs) for p in pairs]
+    masters = [nodes.find(p.masters) for p in pairs]
     acting = [
         p.paired & (front.bonded | (index >= 0).any(axis=1))
         for p, front, index in zip(pairs, scene.solver.fronts, scene.solver.index, strict=True)
@@ -125,18 +105,18 @@ def interface_fields(
     for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
         carried = np.zeros_like(direct)
         for pair, s, m, on in zip(pairs, slaves, masters, acting, strict=True):
-            np.add.at(carried, m[on], pair.weights[on, :, None] * total[s[on], None, :])
+            np.add.at(carried, m[on], pair.forces_on_masters(total[s, :gdim])[on])
         total = direct + carried
     return [
         _fields_of(
             scene,
             p,
-            motion[slaves[p]],
-            motion[masters[p]],
-            np.where(acting[p][:, None], total[slaves[p]], 0.0),
+            point_displacements(motion[slaves[p]], pair.surface.point_maps),
+            point_displacements(motion[masters[p]], pair.master_maps),
+            np.where(acting[p][:, None], total[slaves[p], :gdim], 0.0),
             scene.time if time is None else time,
         )
-        for p in range(len(pairs))
+        for p, pair in enumerate(pairs)
     ]
 
 
