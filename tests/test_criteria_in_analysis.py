@@ -186,7 +186,7 @@ def test_penny_shaped_crack_starts_at_sneddons_load(quantity: str) -> None:
 # --- the criteria beside each other ---------------------------------------------------------------
 
 
-@pytest.mark.quick("1")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 def test_circle_of_three_criteria(order: int) -> None:
@@ -328,6 +328,7 @@ def test_moving_along_with_the_body_changes_no_length() -> None:
         assert t == pytest.approx(criterion.time_of(abs(x)), rel=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_reference_point_and_tip_that_move_are_followed() -> None:
     """Arms turned by a tenth: the way from the pin to the tip is that of their displacements."""
