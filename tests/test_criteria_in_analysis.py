@@ -389,7 +389,7 @@ def test_curve_that_ends_ends_the_growth() -> None:
 
 
 def test_ways_on_a_line_and_where_tips_come_from() -> None:
-    front = plate(fx.CriticalStress(1.0, distance=0.1), order=2).model.fronts[0]
+    front = plate(fx.CriticalStress(1.0, distance=0.1), order=2).solver.fronts[0]
     paths = SurfacePaths(front)
     for _ in range(2):  # the tip at x = 1 goes on to 1.2, by a corner and the midside ahead of it
         tips = front.tips()

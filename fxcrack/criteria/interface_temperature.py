@@ -16,6 +16,7 @@ from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import AmplitudeLike
+from fxcrack.criteria.probe import FrontProbe
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 
@@ -49,6 +50,30 @@ class InterfaceTemperature:
     def breaks(self) -> tuple[float, ...]:
         """Times at which it bends."""
         return tuple(b for a in self.amplitudes for b in a.breaks())
+
+
+def steady(
+    temperature: InterfaceTemperature | None, probe: FrontProbe, criterion: object
+) -> Array | None:
+    """Temperature of the slave nodes, shape (n_nodes,), which never changes; None without.
+
+    Args:
+        temperature: That of the interface.
+        probe: The interface.
+        criterion: Who asks.
+
+    Raises:
+        InputError: It changes in time.
+    """
+    if temperature is None:
+        return None
+    if not temperature.steady:
+        raise InputError(
+            f"interface '{probe.pair.title}': {type(criterion).__name__} cannot follow a "
+            "temperature that changes in time; give Debond(temperature=...), or a criterion by "
+            "energy release rates"
+        )
+    return temperature(0.0)
 
 
 def given_temperature(pair: Pair, gdim: int, temperature: Given) -> InterfaceTemperature | None:
