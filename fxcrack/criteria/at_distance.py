@@ -18,7 +18,7 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.interface.surface_paths import SurfacePaths, Way, locate
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 
 _ROUND_OFF = 1e-11
 """Tractions below this fraction of the largest one count as zero."""
@@ -63,9 +63,7 @@ class _AtDistance:
 
     degree = 1
 
-    def __init__(
-        self, solver: LinearSolver, p: int, distance: float, temperature: Array | None
-    ) -> None:
+    def __init__(self, solver: Solver, p: int, distance: float, temperature: Array | None) -> None:
         self.solver = solver
         self.p = p
         self.distance = distance

@@ -26,7 +26,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.surface_paths import Origins, SurfacePaths
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 
 
 @dataclass(frozen=True)
@@ -152,7 +152,7 @@ _SAME_TIME = 1e-9
 """The curve begins, and f jumps up from 0, this fraction of the time before its first entry."""
 
 
-def mean_position(solver: LinearSolver, where: str) -> Array:
+def mean_position(solver: Solver, where: str) -> Array:
     """Mean reference position of the nodes of a group, shape (3,), length; collective.
 
     Raises:
@@ -185,7 +185,7 @@ class LengthEvaluator:
     ahead = 0.0
     behind = 0.0
 
-    def __init__(self, solver: LinearSolver, p: int, criterion: CrackLengthVsTime) -> None:
+    def __init__(self, solver: Solver, p: int, criterion: CrackLengthVsTime) -> None:
         self.solver = solver
         self.criterion = criterion
         self.front = solver.fronts[p]

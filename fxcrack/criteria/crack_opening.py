@@ -23,7 +23,7 @@ from fxcrack.criteria.at_distance import Stencil, _AtDistance, _on_face
 from fxcrack.criteria.toughness import Tabulated
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class OpeningEvaluator(_AtDistance):
 
     def __init__(
         self,
-        solver: LinearSolver,
+        solver: Solver,
         p: int,
         criterion: CrackOpening,
         temperature: Array | None = None,

@@ -21,7 +21,7 @@ from fxcrack.criteria.at_distance import _ROUND_OFF, _AtDistance, _on_face
 from fxcrack.criteria.toughness import Tabulated
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 
 
 @dataclass(frozen=True)
@@ -131,7 +131,7 @@ class StressEvaluator(_AtDistance):
 
     def __init__(
         self,
-        solver: LinearSolver,
+        solver: Solver,
         p: int,
         criterion: CriticalStress,
         temperature: Array | None = None,

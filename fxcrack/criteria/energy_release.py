@@ -28,7 +28,7 @@ from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.tips import FrontUnits, Tips, edge_midsides, units_of
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 
 Method = Literal["vcct", "closure"]
 
@@ -217,7 +217,7 @@ class RateEvaluator:
 
     def __init__(
         self,
-        solver: LinearSolver,
+        solver: Solver,
         p: int,
         criterion: RateCriterion,
         temperature: InterfaceTemperature | None = None,

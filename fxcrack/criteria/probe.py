@@ -11,13 +11,13 @@ from fxcrack.criteria.crack_closure import opens
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.base import InterfaceSolver
+from fxcrack.solvers.base import Solver
 
 _UNBOUNDED = 1e100
 """Jump per force of a unit that holds a body alone."""
 
 
-def bond_forces(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium) -> Array:
+def bond_forces(solver: Solver, p: int, tips: Tips, state: Equilibrium) -> Array:
     """Tension-positive bond forces at the tips in the tip frames, shape (n, k, 3).
 
     Loads on the crack faces are carried on to the faces that would open.
@@ -36,7 +36,7 @@ def bond_forces(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium)
     return np.asarray(out)
 
 
-def _loads_to_come(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium) -> Array:
+def _loads_to_come(solver: Solver, p: int, tips: Tips, state: Equilibrium) -> Array:
     """Load on the faces the crack is about to open, if that of the wake goes on there.
 
     A pressure p on the faces leaves the bond forces short by p times the part of the tip's
@@ -57,14 +57,14 @@ def _loads_to_come(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibri
     return np.asarray(to_come)
 
 
-def openings(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium) -> Array:
+def openings(solver: Solver, p: int, tips: Tips, state: Equilibrium) -> Array:
     """Openings behind the tips in the tip frames, shape (n, k, 3), length."""
     jump = solver.vectors(p, tips.wake_nodes, state.jump)
     jump = np.einsum("nkm,nkmc->nkc", tips.wake_weights, jump)
     return np.asarray(np.einsum("nci,nkc->nki", tips.frame, jump))
 
 
-def closure_jumps(solver: InterfaceSolver, p: int, tips: Tips, force: Array) -> Array:
+def closure_jumps(solver: Solver, p: int, tips: Tips, force: Array) -> Array:
     """Jumps that letting each unit go alone would open, shape (n, k, 3), length.
 
     Args:
@@ -97,7 +97,7 @@ def _turned(frames: Array, vectors: Array) -> Array:
 
 
 def _released(
-    solver: InterfaceSolver,
+    solver: Solver,
     index: Ints,
     free: npt.NDArray[np.bool_],
     force: Array,

@@ -30,7 +30,7 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.crack_extent import CrackExtent
 from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.steps.bond_records import ReleaseRecord, release_records
 from fxcrack.steps.debond import Criterion, Debond, _warn_of_neutral_onset, softens
 
@@ -55,7 +55,7 @@ class Crack:
         paths: Where tips come from.
     """
 
-    def __init__(self, solver: LinearSolver, p: int, debond: Debond) -> None:
+    def __init__(self, solver: Solver, p: int, debond: Debond) -> None:
         self.solver = solver
         self.p = p
         self.title = debond.interface.title
@@ -200,7 +200,7 @@ class Crack:
 
 
 def make_evaluator(
-    solver: LinearSolver,
+    solver: Solver,
     p: int,
     criterion: Criterion,
     temperature: float | Callable[[Array], npt.ArrayLike] | None = None,
