@@ -18,7 +18,8 @@ from fxcrack.base.errors import SolverError
 from fxcrack.base.machine import machine_memory_mb
 from fxcrack.base.timings import Timings
 from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
-from fxcrack.condensation.direct import DirectCondensation, too_large_for_direct
+from fxcrack.condensation.cost_laws import too_large_for_direct
+from fxcrack.condensation.direct import DirectCondensation
 from fxcrack.condensation.iterative import IterativeCondensation, Roles, SchurColumnCache
 from fxcrack.condensation.mumps_schur import mumps_message
 from fxcrack.condensation.options import CondensedOptions
