@@ -18,7 +18,6 @@ from fxcrack.base import compat
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.timings import Timings
-from fxcrack.bench.cost import _USABLE, shipped
 from fxcrack.condensation.bordered_matrix import BorderedMatrix
 from fxcrack.condensation.mumps_schur import (
     TOO_SMALL,
@@ -329,19 +328,3 @@ class DirectCondensation:
         self._bordered.destroy()
         if not keep_transform:
             self.coordinates.transform.destroy()
-
-
-def too_large_for_direct(dofs: int, memory: float) -> str | None:
-    """Why a 3-D model of some dofs should not be factored in a memory, ``None`` if it may.
-
-    Args:
-        dofs: Displacement dofs.
-        memory: Bytes of all machines together.
-    """
-    needed = shipped().laws["direct_memory_3"](dofs)
-    if needed <= _USABLE * memory:
-        return None
-    return (
-        f"a factorisation of {dofs} dofs would take about {needed / 1e9:.0f} GB of the "
-        f"{memory / 1e9:.0f} GB there are"
-    )

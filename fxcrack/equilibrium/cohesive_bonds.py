@@ -141,11 +141,6 @@ class CohesiveBonds:
         _, stiffness = self._laws()
         return np.asarray(np.linalg.solve(self.star - stiffness, right))
 
-    def forces(self, jump: Array) -> Array:
-        """Forces on the slave side at given soft jumps, shape (r,)."""
-        constant, stiffness = self._laws()
-        return np.asarray(constant + stiffness @ jump)
-
     def stable(self) -> bool:
         """Whether S* - B is positive definite, and not just so."""
         _, stiffness = self._laws(NEUTRAL)

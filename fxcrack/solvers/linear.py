@@ -16,7 +16,8 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import ComesApart
 from fxcrack.base.machine import machine_memory_mb
 from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
-from fxcrack.condensation.direct import DirectCondensation, too_large_for_direct
+from fxcrack.condensation.cost_laws import too_large_for_direct
+from fxcrack.condensation.direct import DirectCondensation
 from fxcrack.condensation.iterative import IterativeCondensation, Roles, SchurColumnCache
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.condensation.retained import ColumnCost, CostModel
