@@ -40,10 +40,9 @@ def bracketed_root(
     rising = f_high >= 0.0
     width, tried = high - low, 0
     for _ in range(_MOST):
-        if tried == _SECANTS:
+        x, tried = low - f_low * (high - low) / (f_high - f_low), tried + 1
+        if tried > _SECANTS or not low < x < high:
             x, width, tried = 0.5 * (low + high), 0.5 * (high - low), 0
-        else:
-            x, tried = low - f_low * (high - low) / (f_high - f_low), tried + 1
         if not low < x < high:
             break
         value = function(x)
