@@ -16,8 +16,10 @@ import fxcrack as fx
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.load_vectors import load_vector
 from fxcrack.continuum.loads import Load, constant
 from fxcrack.continuum.materials import strain_rotation
+from fxcrack.continuum.stress import cell_stress, von_mises
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.penny import penny
@@ -195,7 +197,7 @@ def body(comm: MPI.Intracomm, name: str) -> Continuum:
 
 def totals(continuum: Continuum, load: Load) -> Array:
     """Resultant force and, in the last place, the moment of the x, y components about z."""
-    vector = continuum.load_vector(load)
+    vector = load_vector(continuum, load)
     f = gathered_vector(vector).reshape(-1, continuum.gdim)
     vector.destroy()
     n = continuum.n_local // continuum.gdim
@@ -273,8 +275,8 @@ def test_stress_of_a_uniform_strain(comm: MPI.Intracomm) -> None:
     continuum = Continuum(mesh, parts, fx.PlaneStrain())
     u = dolfinx.fem.Function(continuum.space)
     u.interpolate(lambda x: np.stack([1e-3 * x[0], 0.0 * x[0]]))
-    stress = continuum.stress(u).x.array.reshape(-1, 4)
-    mises = continuum.von_mises(continuum.stress(u)).x.array
+    stress = cell_stress(continuum, u).x.array.reshape(-1, 4)
+    mises = von_mises(continuum, cell_stress(continuum, u)).x.array
     for name, material in parts.items():
         cells = mesh.group(name).entities
         s = 1e-3 * material.stiffness()[[0, 1, 2, 5], 0]  # xx, yy, zz, xy
@@ -303,17 +305,17 @@ def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
         "materials cover .* not at all .* name every cell group exactly once",
         lambda: Continuum(mesh, {"upper": steel}, fx.PlaneStrain()),
     )
-    refused("has no group 'middle'", lambda: plane.load_vector(fx.Traction("middle", (0.0, 1.0))))
+    refused("has no group 'middle'", lambda: load_vector(plane, fx.Traction("middle", (0.0, 1.0))))
     refused(
         "load 'top': 3 components given, 2 needed",
-        lambda: plane.load_vector(fx.Traction("top", (0.0, 1.0, 0.0))),
+        lambda: load_vector(plane, fx.Traction("top", (0.0, 1.0, 0.0))),
     )
     refused(
         "load 'pin_top': 2 components given, 3 needed",
-        lambda: solid.load_vector(fx.PointForce("pin_top", (0.0, 1.0))),
+        lambda: load_vector(solid, fx.PointForce("pin_top", (0.0, 1.0))),
     )
     refused(
         r"Monitor\('u_top'\): direction has 2 components, 3 are needed",
         lambda: load_and_monitor_vectors(solid, [], [fx.Monitor("top", (0.0, 1.0))]),
     )
-    refused("dimension 1 is needed here", lambda: plane.load_vector(fx.Pressure("pin_top", 1.0)))
+    refused("dimension 1 is needed here", lambda: load_vector(plane, fx.Pressure("pin_top", 1.0)))

@@ -23,6 +23,7 @@ from specimens import bond, gathered, gathered_vector
 from test_interface_pairing import three_blocks, tie, turn
 
 import fxcrack as fx
+from fxcrack.continuum.load_vectors import load_vector
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.enf import enf_2d
@@ -197,7 +198,7 @@ class Oracle:
         self.f = np.zeros(self.k.shape[0])
         self.patterns = []
         for load in scene.loads:
-            vector = continuum.load_vector(load)
+            vector = load_vector(continuum, load)
             self.patterns.append(gathered_vector(vector))
             self.f += load.amplitude(scene.time) * self.patterns[-1]
             vector.destroy()

@@ -14,6 +14,7 @@ from fxcrack.base import compat
 from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.load_vectors import load_vector
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 
@@ -31,7 +32,7 @@ def load_and_monitor_vectors(
     """
     out = []
     for load in loads:
-        vector = continuum.load_vector(load)
+        vector = load_vector(continuum, load)
         good = np.all(np.isfinite(vector.array_r))
         bad = f"load '{load.title}' is not a finite number everywhere; mend its value"
         raise_on_all_ranks(continuum.comm, None if good else bad)

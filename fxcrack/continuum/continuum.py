@@ -1,4 +1,4 @@
-"""The linear elastic continuum: displacement space, stiffness, load vectors, stress.
+"""The linear elastic continuum: displacement space, materials of its parts, stiffness.
 
     K u = sum_i lambda_i(t) f_i,      K = int  strain(v)^T C strain(u)  w dV
 
@@ -8,8 +8,8 @@ columns of the coordinate transformation (:mod:`fxcrack.interface.jump_coordinat
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import basix
@@ -26,13 +26,11 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.kinematics import Axisymmetric, Model
-from fxcrack.continuum.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
+from fxcrack.continuum.loads import Field
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.temperature import ByTemperature, Temperature
+from fxcrack.continuum.temperature_field import TemperatureField, interpolated
 from fxcrack.mesh import Mesh
-
-if TYPE_CHECKING:
-    from fxcrack.continuum.temperature import Temperature
-    from fxcrack.continuum.thermal_strain import TemperatureField, ThermalLoad
 
 Ints = npt.NDArray[np.int32]
 
@@ -103,11 +101,9 @@ class Continuum:
             if isinstance(weight, float)
             else weight
         )
-        self.degree = 2 * self.order + (1 if "Axisymmetric" in type(model).__name__ else 0)
+        self.degree = 2 * self.order + (1 if isinstance(model, Axisymmetric) else 0)
         self.temperature: TemperatureField | None = None
         if temperature is not None:
-            from fxcrack.continuum.thermal_strain import TemperatureField
-
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
         listed = materials.values() if isinstance(materials, Mapping) else [materials]
         for material in listed:
@@ -173,18 +169,26 @@ class Continuum:
     def _moduli(self, i: int) -> tuple[Any, Any]:
         """Stiffness on the strains of the model, and all its stresses per unit strain."""
         material, model = self.part_materials[i], self.model
-        if self.temperature is not None and hasattr(material, "temperatures"):
-            from fxcrack.continuum.thermal_strain import interpolated
-
+        if self.temperature is not None and isinstance(material, ByTemperature):
             return (
-                interpolated(self, i, lambda m: model.reduce(m.stiffness())),
-                interpolated(self, i, lambda m: model.recover(m.stiffness())),
+                self.by_temperature(i, lambda m: model.reduce(m.stiffness())),
+                self.by_temperature(i, lambda m: model.recover(m.stiffness())),
             )
         domain, c = self.mesh.domain, material.stiffness()
         return (
             fem.Constant(domain, self.model.reduce(c)),
             fem.Constant(domain, self.model.recover(c)),
         )
+
+    def by_temperature(self, i: int, quantity: Callable[[Material], Array]) -> Any:
+        """A quantity of a part's material at the present temperature, UFL.
+
+        Args:
+            i: Which part.
+            quantity: Of an elastic material, of any one shape.
+        """
+        material = self.part_materials[i]
+        return interpolated(self.mesh.domain, material, self.temperature, quantity)
 
     def compile(self) -> None:
         """Compile the stiffness form (cached on disk by DOLFINx); assembly does it otherwise."""
@@ -201,29 +205,6 @@ class Continuum:
         matrix = dolfinx.fem.petsc.assemble_matrix(self._form)
         matrix.assemble()
         return matrix
-
-    def load_vector(self, load: Load | ThermalLoad) -> PETSc.Vec:
-        """Nodal forces of a load at amplitude 1; the caller destroys the vector."""
-        v = ufl.TestFunction(self.space)
-        if isinstance(load, Traction):
-            ds = self.surface(load.where)
-            form = ufl.inner(self._vector(load.value, load.title), v) * self.weight * ds
-        elif isinstance(load, Pressure):
-            ds = self.surface(load.where)
-            normal = ufl.FacetNormal(self.mesh.domain)
-            form = -ufl.inner(self.field(load.value) * normal, v) * self.weight * ds
-        elif isinstance(load, BodyForce):
-            value = self._vector(load.value, load.title)
-            form = ufl.inner(value, v) * self.weight * self.volume(load.where)
-        elif not isinstance(load, PointForce):
-            from fxcrack.continuum.thermal_strain import load_form
-
-            form = load_form(self, load, v)
-        else:
-            return self._point_force(load.where, load.value, load.title)
-        vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
-        vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
-        return vector
 
     def surface(self, where: str) -> Any:
         """UFL measure of a named facet group."""
@@ -273,24 +254,6 @@ class Continuum:
         function.interpolate(at)
         return function
 
-    def _check_components(self, value: tuple[Field, ...], title: str) -> None:
-        given = len(value) if hasattr(value, "__len__") else "no list of"
-        if given != self.gdim:
-            raise InputError(f"load '{title}': {given} components given, {self.gdim} needed")
-
-    def _vector(self, value: tuple[Field, ...], title: str) -> Any:
-        self._check_components(value, title)
-        return ufl.as_vector([self.field(v) for v in value])
-
-    def _point_force(self, where: str, value: tuple[float, ...], title: str) -> PETSc.Vec:
-        self._check_components(value, title)
-        nodes = self.owned_nodes(where)
-        count = self.comm.allreduce(len(nodes))
-        vector = PETSc.Vec().createMPI((self.n_local, self.n_global), comm=self.comm)
-        for i, component in enumerate(value):
-            vector.array[self.layout.dof(nodes, i)] = component / count
-        return vector
-
     def owned_nodes(self, where: str) -> Ints:
         """Displacement nodes of a group that this rank owns (local block indices); collective.
 
@@ -308,56 +271,6 @@ class Continuum:
     def positions(self) -> Array:
         """Positions of the local displacement nodes, owned first, shape (n, 3), length."""
         return np.asarray(self.space.tabulate_dof_coordinates())
-
-    def stress(self, u: fem.Function) -> fem.Function:
-        """Cell averages of the stress, components in the order of ``model.stress_labels``.
-
-        That of the small strain, at the present temperature (``temperature.set(time)``).
-        """
-        strain = self.model.strain(u, self.x)
-        return self.cell_means(
-            [(self.small_stress(i, strain), self.parts[i][2]) for i in range(len(self.parts))]
-        )
-
-    def cell_means(self, stresses: list[tuple[Any, Any]]) -> fem.Function:
-        """Cell averages of UFL stresses, one with its measure per part; collective."""
-        n = len(self.model.stress_labels)
-        element = basix.ufl.element("DG", self.mesh.domain.basix_cell(), 0, shape=(n,))
-        space = fem.functionspace(self.mesh.domain, element)
-        test = ufl.TestFunction(space)
-        volume = dolfinx.fem.petsc.assemble_vector(
-            fem.form(ufl.inner(ufl.as_vector([1.0] * n), test) * self.weight * ufl.dx)
-        )
-        sigma = sum(ufl.inner(stress, test) * self.weight * dx for stress, dx in stresses)
-        integral = dolfinx.fem.petsc.assemble_vector(fem.form(sigma))
-        out = fem.Function(space, name="stress")
-        local = len(volume.array)
-        out.x.array[:local] = integral.array / volume.array
-        out.x.scatter_forward()
-        volume.destroy()
-        integral.destroy()
-        return out
-
-    def small_stress(self, i: int, strain: Any) -> Any:
-        """All stresses (``model.stress_labels``) of a part at a small strain, UFL."""
-        if self.temperature is None:
-            return ufl.dot(self.parts[i][1], strain)
-        from fxcrack.continuum.thermal_strain import whole_stress
-
-        return whole_stress(self, i, strain)
-
-    def von_mises(self, stress: fem.Function) -> fem.Function:
-        """Von Mises stress per cell, of the cell averages of the stress."""
-        labels = self.model.stress_labels
-        s = stress.x.array.reshape(-1, len(labels))
-        a, b, c = s[:, :3].T  # the normal stresses come first in every model
-        shears = s[:, 3:].T
-        space = fem.functionspace(self.mesh.domain, ("DG", 0))
-        out = fem.Function(space, name="von_mises")
-        out.x.array[:] = np.sqrt(
-            0.5 * ((a - b) ** 2 + (b - c) ** 2 + (c - a) ** 2) + 3.0 * sum(t**2 for t in shears)
-        )
-        return out
 
 
 __all__ = ["Continuum", "compat"]

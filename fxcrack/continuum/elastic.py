@@ -14,7 +14,14 @@ from dolfinx import fem
 
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import deformation_gradient, green_lagrange, labelled, tensor
+from fxcrack.continuum.stress import small_stress
 from fxcrack.continuum.term import StoringTerm
+from fxcrack.continuum.thermal_strain import (
+    expansion,
+    square_expansion,
+    whole,
+    whole_stiffness,
+)
 
 
 class Elastic(StoringTerm):
@@ -40,13 +47,11 @@ class Elastic(StoringTerm):
             stiffness, _, dx = c.parts[i]
             e = strain
             if c.temperature is not None:
-                from fxcrack.continuum import thermal_strain as thermal
-
                 rise = c.temperature.rise
-                stiffness = thermal.whole_stiffness(c, i)
-                e = thermal.whole(c.model, strain) - rise * thermal.expansion(c, i)
+                stiffness = whole_stiffness(c, i)
+                e = whole(c.model, strain) - rise * expansion(c, i)
                 if self.finite:
-                    e -= rise**2 / 2 * thermal.square_expansion(c, i)
+                    e -= rise**2 / 2 * square_expansion(c, i)
             total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
         return total
 
@@ -59,11 +64,11 @@ class Elastic(StoringTerm):
         c = self._continuum
         small = c.model.strain(u, c.x)
         if not self.finite:
-            return [(c.small_stress(i, small), c.parts[i][2]) for i in self._parts]
+            return [(small_stress(c, i, small), c.parts[i][2]) for i in self._parts]
         f = deformation_gradient(c.model, u, c.x)
         out = []
         for i in self._parts:
             strain = green_lagrange(c.model, u, c.x)
-            second = tensor(c.model, c.small_stress(i, strain))
+            second = tensor(c.model, small_stress(c, i, strain))
             out.append((labelled(c.model, f * second * f.T / ufl.det(f)), c.parts[i][2]))
         return out

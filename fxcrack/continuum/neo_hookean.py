@@ -18,6 +18,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import PlaneStress, deformation_gradient, labelled
 from fxcrack.continuum.term import StoringTerm
+from fxcrack.continuum.thermal_strain import expansion
 
 
 class NeoHookeanBodies(StoringTerm):
@@ -61,9 +62,7 @@ class NeoHookeanBodies(StoringTerm):
         )
         if c.temperature is None:
             return f, 1, mu, lame
-        from fxcrack.continuum import thermal_strain as thermal
-
-        stretch = 1 + c.temperature.rise * thermal.expansion(c, i)[0]
+        stretch = 1 + c.temperature.rise * expansion(c, i)[0]
         return f / stretch, stretch, mu, lame
 
     def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:

@@ -2,7 +2,8 @@
 
     T(x, t) = T_ref + a(t) (T(x) - T_ref),    or fields at some times, linear in between
 
-Pure data; :mod:`fxcrack.continuum.thermal_strain` makes forms of it.
+Pure data; :mod:`fxcrack.continuum.temperature_field` puts it on a mesh and
+:mod:`fxcrack.continuum.thermal_strain` makes forms of it.
 """
 
 from __future__ import annotations

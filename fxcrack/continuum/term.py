@@ -15,6 +15,7 @@ from dolfinx import fem
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
+from fxcrack.continuum.thermal_work import ThermalWork
 
 
 class Term:
@@ -108,10 +109,8 @@ class StoringTerm(Term):
     def __init__(self, continuum: Continuum, form: str) -> None:
         self._continuum = continuum
         self._parts = parts_of(continuum, form)
-        self._thermal: Any = None
+        self._thermal: ThermalWork | None = None
         if continuum.temperature is not None:
-            from fxcrack.continuum.thermal_work import ThermalWork
-
             self._thermal = ThermalWork(continuum, self.energy)
 
     def begin(self, time: float, dt: float) -> None:

@@ -1,4 +1,4 @@
-"""Temperature in the bodies: its field, the strain it causes and what that adds to the forms.
+"""Thermal strain: the strain that a temperature causes and what it adds to the forms.
 
     W = 1/2 int (e - e_th) : C : (e - e_th) w dV,    e_th = expansion (T - T_ref)
 
@@ -8,120 +8,22 @@ held back and stores energy; in plane stress it is that of the plane: the sheet 
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import basix
-import basix.ufl
-import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
 
-from fxcrack.base import compat
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStress
 from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.continuum.materials import Material
-from fxcrack.continuum.temperature import ByTemperature, Spatial, Temperature, expansion_of
-
-if TYPE_CHECKING:
-    from fxcrack.continuum.continuum import Continuum
-
-
-class TemperatureField:
-    """The temperature of a scene on its mesh.
-
-    It is kept one order below the displacement, as strains are: constant in a first-order cell,
-    linear in a second-order one. So a temperature that the displacement can follow freely causes no
-    stress.
-
-    Args:
-        domain: The mesh.
-        order: Order of the displacement.
-        effect: What the user gave.
-
-    Attributes:
-        rise: T - T_ref at present.
-        patterns: T_k - T_ref of the patterns.
-        amplitudes: Their factors in time.
-        version: Counts the changes of ``rise``.
-    """
-
-    def __init__(self, domain: dolfinx.mesh.Mesh, order: int, effect: Temperature) -> None:
-        element = basix.ufl.element(
-            "DG",
-            domain.basix_cell(),
-            order - 1,
-            lagrange_variant=basix.LagrangeVariant.legendre,
-        )
-        space = fem.functionspace(domain, element)
-        self.effect = effect
-        self.domain = domain
-        self.rise = fem.Function(space, name="temperature_rise")
-        self.patterns: list[fem.Function] = []
-        self.amplitudes: list[AmplitudeLike] = []
-        self.version = 0
-        for field, amplitude in effect.patterns():
-            pattern = fem.Function(space)
-            _interpolate(pattern, field, effect.reference)
-            self.patterns.append(pattern)
-            self.amplitudes.append(amplitude)
-        self._factors = np.zeros(len(self.patterns))
-        self.set(0.0)
-
-    @property
-    def temperature(self) -> Any:
-        """Temperature at present, UFL."""
-        return self.effect.reference + self.rise
-
-    def set(self, time: float) -> None:
-        """Make a time the present one."""
-        factors = np.array([a(time) for a in self.amplitudes])
-        if np.array_equal(factors, self._factors):
-            return
-        self._factors = factors
-        self.rise.x.array[:] = 0.0
-        for factor, pattern in zip(factors, self.patterns, strict=True):
-            self.rise.x.array[:] += factor * pattern.x.array
-        self.version += 1
-
-    def nodal_patterns(self, space: fem.FunctionSpace) -> Array:
-        """Patterns at the local nodes of a (vector) Lagrange space, shape (n_patterns, n)."""
-        out = []
-        for field, _ in self.effect.patterns():
-            values = fem.Function(space)
-            _interpolate(values, field, self.effect.reference)
-            out.append(values.x.array[:: space.dofmap.index_map_bs].copy())
-        return np.array(out)
-
-
-def _interpolate(out: fem.Function, field: Spatial, reference: float) -> None:
-    """Set a function to (field - reference), all components alike."""
-    space = out.function_space
-    n = int(np.prod(out.ufl_shape))
-    if isinstance(field, fem.Function):
-        if field.function_space.mesh is not space.mesh or field.ufl_shape != ():
-            raise InputError(
-                "Temperature: a DOLFINx Function must be a scalar one on the mesh of the scene "
-                "(mesh.domain)"
-            )
-        value = field - reference
-        points = compat.interpolation_points(space)
-        out.interpolate(fem.Expression(value if n == 1 else ufl.as_vector([value] * n), points))
-    elif callable(field):
-
-        def values(x: Array) -> Array:
-            given = np.broadcast_to(field(x), x.shape[1]) - reference
-            return np.asarray(given if n == 1 else np.tile(given, (n, 1)))
-
-        out.interpolate(values)
-    else:
-        rise = float(field) - reference
-        out.interpolate(lambda x: np.full(x.shape[1] if n == 1 else (n, x.shape[1]), rise))
+from fxcrack.continuum.temperature import ByTemperature, expansion_of
+from fxcrack.continuum.temperature_field import TemperatureField, entries
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +57,7 @@ def thermal_loads(continuum: Continuum) -> list[ThermalLoad]:
 
 def expands(continuum: Continuum) -> bool:
     """Whether any material of a continuum has thermal strain."""
-    return any(np.any(expansion_of(m)) for part in continuum.part_materials for m in _entries(part))
+    return any(np.any(expansion_of(m)) for part in continuum.part_materials for m in entries(part))
 
 
 def is_linear(continuum: Continuum) -> bool:
@@ -210,10 +112,6 @@ def _field_of(continuum: Continuum) -> TemperatureField:
     return continuum.temperature
 
 
-def _entries(material: Material) -> list[Material]:
-    return material.materials if isinstance(material, ByTemperature) else [material]
-
-
 # -- strain and stiffness in which thermal strain is complete ------------------------------------
 
 
@@ -229,13 +127,13 @@ def whole(model: Model, strain: Any) -> Any:
 
 def whole_stiffness(continuum: Continuum, i: int) -> Any:
     """Stiffness of a part on :func:`whole` strains, UFL."""
-    return interpolated(continuum, i, lambda m: _whole_matrix(continuum.model, m.stiffness()))
+    return continuum.by_temperature(i, lambda m: _whole_matrix(continuum.model, m.stiffness()))
 
 
 def expansion(continuum: Continuum, i: int) -> Any:
     """Thermal strain per degree of a part, components of :func:`whole`, UFL."""
     keep = [0, 1, 5] if isinstance(continuum.model, PlaneStress) else list(range(6))
-    return interpolated(continuum, i, lambda m: expansion_of(m)[keep])
+    return continuum.by_temperature(i, lambda m: expansion_of(m)[keep])
 
 
 def square_expansion(continuum: Continuum, i: int) -> Any:
@@ -250,27 +148,11 @@ def square_expansion(continuum: Continuum, i: int) -> Any:
         s = t @ t
         return np.array([s[0, 0], s[1, 1], s[2, 2], 2 * s[1, 2], 2 * s[0, 2], 2 * s[0, 1]])[keep]
 
-    return interpolated(continuum, i, square)
+    return continuum.by_temperature(i, square)
 
 
 def _whole_matrix(model: Model, c: Array) -> Array:
     return model.reduce(c) if isinstance(model, PlaneStress) else c
-
-
-def interpolated(continuum: Continuum, i: int, quantity: Any) -> Any:
-    """A quantity of a part's material, linear in the present temperature where it is tabulated."""
-    domain, material = continuum.mesh.domain, continuum.part_materials[i]
-    values = [fem.Constant(domain, np.asarray(quantity(m))) for m in _entries(material)]
-    if len(values) == 1:
-        return values[0]
-    assert isinstance(material, ByTemperature)
-    temperature = _field_of(continuum).temperature
-    out = values[0]
-    knots = material.temperatures
-    for k, (low, high) in enumerate(itertools.pairwise(knots)):
-        share = ufl.max_value(0.0, ufl.min_value(1.0, (temperature - low) / (high - low)))
-        out = out + share * (values[k + 1] - values[k])
-    return out
 
 
 def whole_stress(continuum: Continuum, i: int, strain: Any) -> Any:

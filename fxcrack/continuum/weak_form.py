@@ -23,6 +23,7 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import FileOrder, Place
+from fxcrack.continuum.stress import cell_means
 from fxcrack.continuum.term import Term
 
 _SAME = 1e-9
@@ -188,9 +189,8 @@ class WeakForm:
 
         Components in the order of ``model.stress_labels``.
         """
-        return self.continuum.cell_means(
-            [part for term in self.terms for part in term.stresses(self.u)]
-        )
+        parts = [part for term in self.terms for part in term.stresses(self.u)]
+        return cell_means(self.continuum, parts)
 
     def spent(self) -> dict[str, float]:
         """Energies turned into something else so far, by name; collective."""

@@ -17,6 +17,7 @@ from dolfinx import fem
 from fxcrack.base.errors import InputError
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.stress import cell_stress, von_mises
 from fxcrack.history import Row
 from fxcrack.interface.pairing import Pair
 from fxcrack.output.interface_fields import InterfaceFields, in_space, interface_fields
@@ -57,7 +58,7 @@ def stress_function(scene: Scene, u: fem.Function, time: float) -> fem.Function:
         return bodies.stress()
     if scene.continuum.temperature is not None:
         scene.continuum.temperature.set(time)
-    return scene.continuum.stress(u)
+    return cell_stress(scene.continuum, u)
 
 
 # -- grids -----------------------------------------------------------------------------------------
@@ -67,7 +68,7 @@ def body_grid(scene: Scene, u: fem.Function, time: float) -> Grid:
     """This rank's cells with displacement, stress and von Mises stress; collective."""
     continuum = scene.continuum
     stress = stress_function(scene, u, time)
-    equivalent = continuum.von_mises(stress)
+    equivalent = von_mises(continuum, stress)
     topology, kinds, x = dolfinx.plot.vtk_mesh(continuum.space)
     width = continuum.space.dofmap.dof_layout.num_dofs
     cells = np.asarray(topology).reshape(-1, width + 1)[:, 1:]

@@ -23,6 +23,7 @@ from matplotlib.figure import Figure
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import unknown_name
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.stress import von_mises
 from fxcrack.interface.surface import facet_nodes
 from fxcrack.output.fields import displacement_function, stress_function
 from fxcrack.output.plots.style import GREY, INK, colour_bar, dress, new_figure, save
@@ -96,7 +97,7 @@ def shape(scene: Scene, component: str = "von_mises") -> Shape:
     u = displacement_function(scene)
     stress = stress_function(scene, u, scene.time)
     if component == "von_mises":
-        values = _per_cell(continuum.von_mises(stress), 1)[:, 0]
+        values = _per_cell(von_mises(continuum, stress), 1)[:, 0]
     else:
         values = _per_cell(stress, len(labels))[:, labels.index(component)]
     x = continuum.positions()

@@ -1,0 +1,78 @@
+"""Nodal forces of dead loads at amplitude 1.
+
+    f . v = int t . v w dA,    -int p n . v w dA,    int b . v w dV,    int e(v) : C : e_th w dV
+
+of a traction, a pressure, a body force and a temperature pattern, with the weight w of the
+kinematic model; a point force is shared equally by the nodes of its group.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import dolfinx.fem.petsc
+import ufl
+from dolfinx import fem
+from petsc4py import PETSc
+
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
+from fxcrack.continuum.thermal_strain import ThermalLoad, load_form
+
+
+def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
+    """Nodal forces of a load at amplitude 1; collective.
+
+    Args:
+        continuum: Displacement space, model and groups.
+        load: Where and how much.
+
+    Returns:
+        Forces on the owned dofs, shape (n_global,), force; the caller destroys the vector.
+
+    Raises:
+        InputError: The load has the wrong number of components, or its group does not fit.
+    """
+    if isinstance(load, PointForce):
+        return _point_force(continuum, load.where, load.value, load.title)
+    v = ufl.TestFunction(continuum.space)
+    if isinstance(load, Traction):
+        ds = continuum.surface(load.where)
+        form = ufl.inner(_vector(continuum, load.value, load.title), v) * continuum.weight * ds
+    elif isinstance(load, Pressure):
+        ds = continuum.surface(load.where)
+        normal = ufl.FacetNormal(continuum.mesh.domain)
+        form = -ufl.inner(continuum.field(load.value) * normal, v) * continuum.weight * ds
+    elif isinstance(load, BodyForce):
+        value = _vector(continuum, load.value, load.title)
+        form = ufl.inner(value, v) * continuum.weight * continuum.volume(load.where)
+    else:
+        form = load_form(continuum, load, v)
+    vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
+    vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
+    return vector
+
+
+def _check_components(continuum: Continuum, value: tuple[Field, ...], title: str) -> None:
+    given = len(value) if hasattr(value, "__len__") else "no list of"
+    if given != continuum.gdim:
+        raise InputError(f"load '{title}': {given} components given, {continuum.gdim} needed")
+
+
+def _vector(continuum: Continuum, value: tuple[Field, ...], title: str) -> Any:
+    _check_components(continuum, value, title)
+    return ufl.as_vector([continuum.field(v) for v in value])
+
+
+def _point_force(
+    continuum: Continuum, where: str, value: tuple[float, ...], title: str
+) -> PETSc.Vec:
+    _check_components(continuum, value, title)
+    layout = continuum.layout
+    nodes = continuum.owned_nodes(where)
+    count = continuum.comm.allreduce(len(nodes))
+    vector = PETSc.Vec().createMPI((layout.n_local, layout.n_global), comm=continuum.comm)
+    for i, component in enumerate(value):
+        vector.array[layout.dof(nodes, i)] = component / count
+    return vector
