@@ -36,6 +36,7 @@ from fxcrack.mesh import Mesh
 from fxcrack.output.explain import Explanation, explain
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, restart_manager
+from fxcrack.solvers.base import Solver
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.steps.crack import Crack
@@ -44,7 +45,7 @@ from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import CyclicDriver
 from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import CrackLength
-from fxcrack.steps.force_ramps import ForceRamp, given_forces
+from fxcrack.steps.force_ramps import ForceRamp
 from fxcrack.steps.progress import Progress
 from fxcrack.steps.quasi_static import Observer, QuasiStaticDriver
 from fxcrack.steps.static import Dynamic, Static
@@ -136,7 +137,7 @@ class Scene:
         self.plan = plan(self.continuum, self.effects, loads, interfaces, path)
         self.loads = dead_loads(self.continuum, loads, self.plan.path)
         parts = self.continuum, self.pairs, self.supports, self.loads, monitors
-        self.solver: LinearSolver
+        self.solver: Solver
         if self.plan.path == "condensed":
             self.solver = LinearSolver(*parts, options or CondensedOptions())
         else:
@@ -246,9 +247,6 @@ class Scene:
                 warn_of_held_bonds(pair, held)
             self.solver.start()
             self._started = True
-        else:
-            # another window: the same equilibrium in its components
-            self.solver.solve(given_forces(self.solver, self.ramps, self.time, self._increment))
         self.history.reason = keeper.finished or self._go(
             cracks, step, keeper, progress=progress, observers=observers
         )

@@ -32,6 +32,7 @@ from fxcrack.bench.rates import dense_rate, message_rate, unshared_rate
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_3d
+from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.end_conditions import CrackLength
 from fxcrack.steps.static import Static
 
@@ -155,6 +156,7 @@ def measure(case: Case, comm: MPI.Intracomm) -> Result:
     seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "march", "fields")}
     seconds["total"] = end - clock[0] - (clock[3] - clock[2])
     system = scene.solver.system
+    assert isinstance(scene.solver, LinearSolver)
     store = scene.solver.columns
     space = store.space if store is not None else None
     result: Result = {

@@ -67,7 +67,7 @@ class CohesiveBonds:
 
     @property
     def components(self) -> Ints:
-        """Window components of all bonds, shape (r,)."""
+        """Components of all bonds, shape (r,)."""
         if not self.bonds:
             return np.zeros(0, dtype=np.int64)
         return np.concatenate([b.components for b in self.bonds])

@@ -60,7 +60,7 @@ def explain(scene: Scene) -> Explanation:
     unknowns = {"displacements": scene.continuum.n_global}
     counts = {"form terms": 1, "factorisations": model.timings.factorizations}
     costs: dict[str, float] = {}
-    if hasattr(model, "system"):
+    if model.prepared:
         system = model.system
         unknowns["jumps in the window"] = system.n_retained
         for kind, number in (

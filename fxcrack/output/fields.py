@@ -32,7 +32,7 @@ def displacement_function(scene: Scene) -> fem.Function:
     Raises:
         InputError: No step was run yet.
     """
-    if not hasattr(scene.solver, "state"):
+    if not scene.solver.prepared:
         raise InputError("the scene has no state yet; run a step before asking for fields")
     u = fem.Function(scene.continuum.space, name="displacement")
     vector = scene.solver.displacement()

@@ -144,7 +144,7 @@ def write_rows(scene: Scene, path: str | Path, rows: list[Row]) -> None:
 
 
 def _growths(scene: Scene) -> list[Crack]:
-    if not hasattr(scene.solver, "state"):
+    if not scene.solver.prepared:
         raise InputError("the scene has no state yet; run a step before asking for its bonds")
     return scene.cracks
 

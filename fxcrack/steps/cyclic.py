@@ -29,7 +29,7 @@ from fxcrack.criteria.evaluator import TipValues, repeat_tips
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import History
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState, TipCycle
 from fxcrack.steps.cycles import Cycles
@@ -61,7 +61,7 @@ class CyclicDriver(QuasiStaticDriver):
 
     def __init__(
         self,
-        solver: LinearSolver,
+        solver: Solver,
         cracks: list[Crack],
         step: Cycles,
         history: History,
@@ -148,7 +148,7 @@ class CyclicDriver(QuasiStaticDriver):
         ends = [loads for _, loads in self._corners[1:]]
         if len(ends) > 1 or system.friction is not None:
             ends.append(self._corners[0][1])
-        saved = system.snapshot()
+        saved = self.solver.interface_state()
         corners, largest = self._once(self._instant(self.solver.state), ends)
         if system.friction is not None:
             # slips settle over some cycles
@@ -162,7 +162,7 @@ class CyclicDriver(QuasiStaticDriver):
         way = corners[:1]
         for a, b in pairwise(corners):
             way += self._between(a, b, largest, _HALVINGS)
-        system.restore(saved)
+        self.solver.restore_interfaces(saved)
         return self._extremes(way)
 
     def _once(self, start: _Instant, ends: list[Array]) -> tuple[list[_Instant], Array]:

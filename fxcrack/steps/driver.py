@@ -19,7 +19,7 @@ from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import History, Row
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.end_conditions import CrackLength, Releases, Time
 from fxcrack.steps.force_ramps import (
@@ -63,7 +63,7 @@ class StepDriver:
 
     def __init__(
         self,
-        solver: LinearSolver,
+        solver: Solver,
         cracks: list[Crack],
         step: Static,
         history: History,
@@ -207,7 +207,6 @@ class StepDriver:
             self._open_at_once(g, nodes)
         if ramp is not None:
             self._ramps[:] = [*still_pulling(self._ramps, self.time, self.increment), ramp]
-            self.solver.keep = [(r.p, int(k)) for r in self._ramps for k in r.nodes]
             self.solver.open(g.p, ramp.nodes)
 
     def _open_at_once(self, g: Crack, nodes: Ints) -> None:
@@ -224,7 +223,6 @@ class StepDriver:
         tips = [g.tips() for g in self.cracks]
         if not all(g.held(t) for g, t in zip(self.cracks, tips, strict=True)):
             self.solver.rebase()
-            self.solver.solve(self._force_at(self.time))
             for g, t in zip(self.cracks, tips, strict=True):
                 g.check_wake(t)
         self._values = [

@@ -72,7 +72,6 @@ class NewtonLoadPath(QuasiStaticDriver):
             if beyond is not None:
                 guess = self._secant(beyond, guess)
                 guess = begin + min(max(guess - begin, -size), size)
-            saved = self.solver.system.snapshot()
             here = self.solver.state
             try:
                 point, values = self._try(guess, strict=strict)
@@ -80,7 +79,7 @@ class NewtonLoadPath(QuasiStaticDriver):
                 off = level - 1.0 if upward else 1.0 - level
                 crossed = off > _AT_ONE and abs(guess - begin) > _SMALLEST * _AT_ONE * whole
                 if crossed and not self._goes_back:
-                    self.solver.revert(saved)
+                    self.solver.revert()
                     beyond = (guess, level)
                     continue
                 if not self.solver.exact:
@@ -119,9 +118,10 @@ class NewtonLoadPath(QuasiStaticDriver):
     @property
     def _goes_back(self) -> bool:
         """Whether a way back leads through the same equilibria: nothing remembers the way there."""
-        system, bodies = self.solver.system, self.solver.bodies
-        remembers = bodies.path_dependent or system.soft.bonds or self._ramps
-        return not (remembers or system.friction is not None or self.solver.follows_sliding)
+        solver = self.solver
+        remembers = solver.bodies.path_dependent or solver.system.soft.bonds or self._ramps
+        slides = solver.system.friction is not None or solver.interfaces.follow_sliding
+        return not (remembers or slides)
 
     def _try(self, at: float, *, strict: bool = False) -> tuple[Equilibrium, list[TipValues]]:
         """The equilibrium at a time, a trial, and the criteria there."""
@@ -190,7 +190,7 @@ class NewtonLoadPath(QuasiStaticDriver):
     def _zero(self, excess: Callable[[Equilibrium], float], value: float, target: float) -> float:
         """Time on the way to a target where the tangent has a quantity at zero, or the target."""
         system = self.solver.system
-        saved = system.snapshot()
+        saved = self.solver.interface_state()
         begin, done, found = self.time, 0.0, target
         state, loads, force = self.solver.state, self.loads_at(target), self._force_at(target)
         for fraction, point in system.pieces(state, loads, force):
@@ -201,13 +201,13 @@ class NewtonLoadPath(QuasiStaticDriver):
                 )
                 break
             done, value = fraction, after
-        system.restore(saved)
+        self.solver.restore_interfaces(saved)
         return found
 
     def _predicted(self, target: float, *, upward: bool) -> float:
         """Time before a target at which f reaches 1 on the tangent; the target if it does not."""
         system = self.solver.system
-        saved = system.snapshot()
+        saved = self.solver.interface_state()
         here, begin, done, found = self.solver.state, self.time, 0.0, target
         for fraction, point in system.pieces(here, self.loads_at(target), self._force_at(target)):
             a, b = (begin + x * (target - begin) for x in (done, fraction))
@@ -216,7 +216,7 @@ class NewtonLoadPath(QuasiStaticDriver):
                 found = a + hit * (b - a)
                 break
             here, done = point, fraction
-        system.restore(saved)
+        self.solver.restore_interfaces(saved)
         return found
 
     def _secant(self, beyond: tuple[float, float], predicted: float) -> float:

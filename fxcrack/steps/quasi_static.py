@@ -17,7 +17,7 @@ from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Row
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.driver import LARGE
 from fxcrack.steps.increment_stepping import IncrementControl, TooManyCutbacks
@@ -344,7 +344,7 @@ class OpeningControl:
         InputError: No monitor has that name, faces rub, or bonds soften.
     """
 
-    def __init__(self, solver: LinearSolver, cracks: Sequence[Crack], names: Sequence[str]) -> None:
+    def __init__(self, solver: Solver, cracks: Sequence[Crack], names: Sequence[str]) -> None:
         self._model = solver
         self.name = " - ".join(names)
         self.opening = 0.0
