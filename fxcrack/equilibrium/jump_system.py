@@ -84,7 +84,7 @@ class JumpSystem:
         contact: Normal components that may be in contact now, shape (n_retained,).
         touches: Normal components that may be in contact once their bond is gone, likewise.
         gap: Initial gaps, shape (n_retained,), length.
-        contact_steps: Number of active-set steps done.
+        contact_steps: Number of active-set steps done, those on earlier sets of jumps included.
         seconds: Time spent following contact, friction or softening, by law.
     """
 

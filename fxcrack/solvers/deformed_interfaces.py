@@ -17,6 +17,7 @@ from fxcrack.interface.jump_coordinates import JumpCoordinates
 from fxcrack.interface.nodes import JumpGather
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.surface import gather_surface
+from fxcrack.solvers.increment_work import IncrementWork
 
 
 class DeformedInterfaces:
@@ -115,4 +116,51 @@ class DeformedInterfaces:
                 self._pairs[p] = with_changing(self._pairs[p], master, known)
 
 
-__all__ = ["DeformedInterfaces"]
+class PairingEnergy:
+    """Energy taken by new pairings of faces that slide.
+
+    Contact forces move to other master points, and gaps that are not zero there close: on the way
+    to the next equilibrium the interfaces do work, of which friction and bonds explain a part. The
+    rest is this energy.
+
+    Attributes:
+        energy: What it is so far.
+    """
+
+    def __init__(self) -> None:
+        self.energy = 0.0
+        self._before: PETSc.Vec | None = None
+
+    @property
+    def pending(self) -> bool:
+        """Whether there is a new pairing whose equilibrium has not been accepted yet."""
+        return self._before is not None
+
+    def begin(self, forces: PETSc.Vec) -> None:
+        """Keep the forces of interfaces and supports before a new pairing, owned from now on."""
+        self.forget()
+        self._before = forces
+
+    def book(self, forces: PETSc.Vec, step: PETSc.Vec, work: IncrementWork, n_forces: int) -> None:
+        """Add the energy of the pairing, by the trapezoidal rule; collective.
+
+        Args:
+            forces: Forces of interfaces and supports after it; destroyed.
+            step: Change of the displacement.
+            work: Work along the increment.
+            n_forces: Number of force patterns.
+        """
+        forces.axpy(1.0, self._before)
+        given = 0.5 * float(forces.dot(step)) - work.support_work(n_forces)
+        self.energy -= given + work.bonds + work.friction
+        forces.destroy()
+        self.forget()
+
+    def forget(self) -> None:
+        """Give up a pairing whose equilibrium is not wanted."""
+        if self._before is not None:
+            self._before.destroy()
+            self._before = None
+
+
+__all__ = ["DeformedInterfaces", "PairingEnergy"]

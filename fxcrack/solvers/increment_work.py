@@ -47,13 +47,17 @@ class IncrementWork:
     bonds: float
     friction: float
 
+    def support_work(self, n_forces: int) -> float:
+        """Work of supports, where there are ``n_forces`` force patterns."""
+        n, a, b = len(self.start.loads) - n_forces, self.start.loads, self.end.loads
+        return float(self.conjugate[:n] @ (b - a)[:n])
+
     def external_work(self, n_forces: int) -> float:
         """Work of supports and force patterns, of which there are ``n_forces``."""
         n, a, b = len(self.start.loads) - n_forces, self.start.loads, self.end.loads
-        work = self.conjugate[:n] @ (b - a)[:n]
-        work += b[n:] @ self.end.conjugate[n:] - a[n:] @ self.start.conjugate[n:]
-        work -= self.conjugate[n:] @ (b - a)[n:]
-        return float(work)
+        by_forces = b[n:] @ self.end.conjugate[n:] - a[n:] @ self.start.conjugate[n:]
+        by_forces -= self.conjugate[n:] @ (b - a)[n:]
+        return self.support_work(n_forces) + float(by_forces)
 
 
 @dataclass

@@ -185,12 +185,14 @@ class InterfaceSolver(ABC):
     def _retain(self, state: InterfaceState) -> None:
         """Condense onto another set of retained jumps, and carry a state over."""
         roles = self._choose_roles(state)
+        contact_steps = self.system.contact_steps
         coordinates, self.system, self.face_loads = self._condense(roles, state.equilibrium.loads)
         self.frames, self.index = coordinates.frames, coordinates.index
         self.held_by_supports = coordinates.held
         for pair, front, held in zip(self.pairs, self.fronts, coordinates.held, strict=True):
             front.tied = held.all(axis=1) | (pair.bonded & ~pair.paired)
         self.system.seconds, self.system.soft.counts = self.law_seconds, self.soft_counts
+        self.system.contact_steps = contact_steps
         start = time.perf_counter()
         state.carry_over(self.system, self.pairs, self.fronts, self.index)
         self.friction_energy = state.friction_energy

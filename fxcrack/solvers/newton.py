@@ -21,24 +21,18 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
-from fxcrack.equilibrium.friction_state import FrictionWork
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
-from fxcrack.solvers import snes
-from fxcrack.solvers.deformed_interfaces import DeformedInterfaces
+from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
 from fxcrack.solvers.increment_work import FINE, EnergyImbalance, IncrementWork, TrialIncrement
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
+from fxcrack.solvers.trial import IncrementSolver
 
-_FAR_OFF = 1e-5
-"""A tangent made where more than this part of the forces was out of balance gives way to that of
-the state itself when one is accepted."""
-_NOISE = 10.0
-"""Energies of an increment may be off by so many times the residual left times the step."""
 _SMALLEST_PIECE = 1e-4
 """Part of a bond force whose removal is the least that is tried at once."""
 _UNSTABLE = (
@@ -102,7 +96,7 @@ class NewtonSolver(InterfaceSolver):
         counts: Solves and iterations so far.
         largest_force: Largest norm of the internal forces of an accepted state, force.
         largest_energy: The largest one stored in an accepted state that was asked for it.
-        pairing_energy: Energy that new pairings of faces that slide have taken so far.
+        pairing: Energy that new pairings of faces that slide have taken.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
     """
@@ -127,23 +121,23 @@ class NewtonSolver(InterfaceSolver):
             )
         self.bodies = bodies
         self.newton = newton
-        self.counts = snes.Counts()
         self.tangent = CondensedTangent(
             bodies, supports, loads, monitors, method=options.method, timings=self.timings
         )
+        self._increments = IncrementSolver(self.tangent, newton, self.n_loads, len(loads))
+        self.counts = self._increments.counts
         self.interfaces = DeformedInterfaces(continuum, pairs, self.fronts, finite=bodies.finite)
         size = continuum.n_local, continuum.n_global
         self.u = PETSc.Vec().createMPI(size, comm=continuum.comm)
         self.at = 0.0
         self.largest_force = self.largest_energy = 0.0
-        self.pairing_energy = 0.0
+        self.pairing = PairingEnergy()
         self.exact = False
         self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: TrialIncrement | None = None
         self._last: IncrementWork | None = None  # of the last trial that was confirmed
         self._energies: dict[str, float] | None = None  # of the accepted state, once asked for
-        self._replaced: PETSc.Vec | None = None  # forces of interfaces before a new pairing
         self._resumed_dense: _Dense | None = None
 
     # -- condensation --------------------------------------------------------------------
@@ -245,84 +239,27 @@ class NewtonSolver(InterfaceSolver):
         Raises:
             ConvergenceError: None was found; the accepted state is in force again.
         """
-        here, system = self.state, self.system
         if self.bodies.closed:
-            self.stored(here)
+            self.stored(self.state)
         self._before = self.interface_state()
         dynamic = self.bodies.dynamic
         self._begun = dt > 0.0 or not dynamic
         if self._begun:
             self.bodies.begin(at, dt)
-        start = time.perf_counter()
-        points = [(0.0, here)]
-        if follow and not dynamic:
-            points += system.pieces(here, loads, force)
-        else:
-            points.append((1.0, system.equilibrium(loads, force)))
-        predicted = points[-1][1]
-        rate = system.rates(loads - here.loads, force - here.force)
-        sliding = None if system.friction is None else FrictionWork.of(system, points)
-        self.timings.add("interface", start)
-        soft = system.soft.components
-        y = self._toward(predicted)
-        problem = snes.InterfaceSnes(
-            self.tangent, system, here, self.u, loads, force,
-            system.forces(predicted, np.arange(system.n_retained)),
-            options=self.newton, counts=self.counts, largest_force=self.largest_force,
-        )  # fmt: skip
-        self.counts.residuals = []
         try:
-            iterations = snes.solve(problem, y)
-            end, values = self._end(problem, predicted, loads)
+            trial = self._increments.find(
+                self.system, self.state, self.u, loads, force, at,
+                follow=follow and not dynamic, largest_force=self.largest_force,
+            )  # fmt: skip
         except ConvergenceError:
             self._fail()
             raise
-        else:
-            u = self.tangent.coordinates.transform.createVecLeft()
-            self.tangent.coordinates.transform.mult(y, u)
-        finally:
-            problem.destroy()
-            y.destroy()
-        # forces are known to what the iteration leaves out of balance, and so is their work
-        noise = _NOISE * problem.level * float(u.norm())
-        u.axpy(1.0, self.u)
-        self.interfaces.move_fronts(u)
-        self.counts.solves += 1
-        self.counts.iterations += iterations
-        drift = problem.drift + (0.0 if problem.renewed else self.tangent.drift)
-        friction = 0.0 if sliding is None else sliding.energy(system, end)
+        self.interfaces.move_fronts(trial.u)
         self._give_up()
-        self._trial = TrialIncrement(
-            points, end, rate, soft, iterations, friction, at, u, values, drift, noise
-        )
+        self._trial = trial
         if confirm:
             self.confirm(strict=strict)
-        return end
-
-    def _toward(self, predicted: Equilibrium) -> PETSc.Vec:
-        """Y of a state on the present tangent."""
-        last = np.zeros(self.tangent.coordinates.n_last)
-        n = self.system.n_retained
-        last[:n] = predicted.jump - self.state.jump
-        last[n : n + self.n_loads] = predicted.loads - self.state.loads
-        return self.tangent.condensation.expanded(last)
-
-    def _end(
-        self, problem: snes.InterfaceSnes, predicted: Equilibrium, loads: Array
-    ) -> tuple[Equilibrium, Array]:
-        """The equilibrium SNES has found, with the dense system through it, and the values there.
-
-        See :class:`TrialIncrement`.
-        """
-        last = predicted if problem.solution is None else problem.solution
-        begin = self.system.n_retained
-        end = begin + len(self.supports.columns)
-        borders = self.tangent.border_values()
-        answers = np.concatenate([problem.values[begin:end], -borders[: len(self.loads)]])
-        state = Equilibrium(loads, last.force, last.jump, answers)
-        values = np.concatenate([problem.values[:end], borders])
-        self.tangent.pass_through(self.system, values, state.jump, loads)
-        return state, values
+        return trial.end
 
     def confirm(self, *, strict: bool = False) -> None:
         """Have the tangent of the trial where it counts, and the work along the increment.
@@ -336,31 +273,20 @@ class NewtonSolver(InterfaceSolver):
             EnergyImbalance: They do not; the accepted state is in force again.
             ConvergenceError: The equilibrium is unstable; likewise.
         """
-        trial, tangent = self._trial, self.tangent
+        trial = self._trial
         assert trial is not None
-        here, end = trial.points[0][1], trial.end
-        trapezoidal = self.bodies.dynamic or self.bodies.path_dependent
-        limit = 0.0 if self.exact else np.inf if trapezoidal else _FAR_OFF
         try:
-            if trial.iterations and trial.drift > limit and not self.bodies.constant:
-                tangent.factor()
-                tangent.pass_through(self.system, trial.values, end.jump, end.loads)
-                trial.drift = 0.0
-            if tangent.renewed and tangent.condensation.n_negative:
-                raise NotPositiveDefinite(0)
+            self._increments.integrate(trial, self.system, exact=self.exact)
         except NotPositiveDefinite as error:
             self._fail()
             raise ConvergenceError(_UNSTABLE) from error
-        after = trial.rate
-        if trial.iterations and not trapezoidal:
-            after = self.system.rates(end.loads - here.loads, end.force - here.force)
-        soft = self.system.soft.components
-        trial.work = trial.integrals(after, soft, trapezoidal=trapezoidal)
         if strict and trial.iterations and self.bodies.closed:
-            self._check_balance(trial, trial.work)
+            self._check_balance(trial)
 
-    def _check_balance(self, trial: TrialIncrement, work: IncrementWork) -> None:
-        assert self._energies is not None
+    def _check_balance(self, trial: TrialIncrement) -> None:
+        """Refuse a trial whose energies do not balance."""
+        work = trial.work
+        assert work is not None and self._energies is not None
         trial.energies = self.bodies.stored()
         before, after = (sum(e.values()) for e in (self._energies, trial.energies))
         given = work.external_work(len(self.loads)) + self.bodies.path_work()
@@ -387,7 +313,8 @@ class NewtonSolver(InterfaceSolver):
         self.largest_energy = max(self.largest_energy, sum((self._energies or {}).values()))
         self.state, self._last = trial.end, trial.work
         self._give_up()
-        self._book_pairing(step)
+        if self.pairing.pending:
+            self.pairing.book(self.nodal_forces(self.u), step, trial.work, len(self.loads))
         step.destroy()
         if self._begun:
             self.bodies.commit()
@@ -476,39 +403,19 @@ class NewtonSolver(InterfaceSolver):
 
         Contact forces move to the master points of the new pairing, and gaps that are not zero in
         it close. The work of the interfaces on the way, by the trapezoidal rule, less what friction
-        and bonds take, is :attr:`pairing_energy`. With inertia all that happens in the next
+        and bonds take, goes to :attr:`pairing`. With inertia all that happens in the next
         increment.
 
         Returns:
             External work.
         """
-        self._replaced = self.nodal_forces(self.u)
+        self.pairing.begin(self.nodal_forces(self.u))
         if self.bodies.dynamic:
             return 0.0
         here = self.state
         self._solve(force)
         self.book_friction(here, self.state)
         return self.along(here, self.state)[0]
-
-    def _book_pairing(self, step: PETSc.Vec) -> None:
-        """Book the energy of a change of pairing at the end of the step after it."""
-        if self._replaced is None:
-            return
-        work = self._last
-        assert work is not None
-        after = self.nodal_forces(self.u)
-        after.axpy(1.0, self._replaced)
-        n = self.n_loads - len(self.loads)
-        supports = work.conjugate[:n] @ (work.end.loads - work.start.loads)[:n]
-        given = 0.5 * float(after.dot(step)) - float(supports)
-        self.pairing_energy -= given + work.bonds + work.friction
-        after.destroy()
-        self._forget_replaced()
-
-    def _forget_replaced(self) -> None:
-        if self._replaced is not None:
-            self._replaced.destroy()
-            self._replaced = None
 
     # -- back to an accepted state -------------------------------------------------------
 
@@ -520,7 +427,7 @@ class NewtonSolver(InterfaceSolver):
             self.u.array.copy(),
             [term.state() for term in self.bodies.terms],
             self.at,
-            self.pairing_energy,
+            self.pairing.energy,
         )
 
     def recall(self, saved: NewtonState) -> None:
@@ -544,8 +451,8 @@ class NewtonSolver(InterfaceSolver):
             saved.interfaces.restore_bonds(self.fronts)
             self._retain(saved.interfaces)
         self._return()
-        self._forget_replaced()
-        self.pairing_energy = saved.pairing_energy
+        self.pairing.forget()
+        self.pairing.energy = saved.pairing_energy
 
     def collect(self) -> Arrays:
         """The accepted state as plain arrays; collective.
@@ -562,7 +469,7 @@ class NewtonSolver(InterfaceSolver):
             out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
         out["dense.schur"], out["dense.offset"] = self.system.schur, self.system.offset
         out["dense.faces"] = self.face_loads
-        sums = self.pairing_energy, self.largest_force, self.largest_energy, self.tangent.drift
+        sums = self.pairing.energy, self.largest_force, self.largest_energy, self.tangent.drift
         out["sums"] = np.array(sums)
         return out
 
@@ -587,7 +494,7 @@ class NewtonSolver(InterfaceSolver):
         self.interfaces.move_fronts(self.u)
         self.at = time
         sums = (float(x) for x in arrays["sums"])
-        self.pairing_energy, self.largest_force, self.largest_energy, drift = sums
+        self.pairing.energy, self.largest_force, self.largest_energy, drift = sums
         state = InterfaceState.from_arrays(arrays, len(self.pairs))
         schur, offset, faces = (
             arrays[f"dense.{name}"].astype(float) for name in ("schur", "offset", "faces")
@@ -621,7 +528,7 @@ class NewtonSolver(InterfaceSolver):
         """Energies the bodies have turned into something else, by name; collective."""
         spent = self.bodies.spent()
         if self.interfaces.follow_sliding:
-            spent["pairing_energy"] = self.pairing_energy
+            spent["pairing_energy"] = self.pairing.energy
         return spent
 
     def extra_work(self, state: Equilibrium) -> float:
@@ -639,7 +546,7 @@ class NewtonSolver(InterfaceSolver):
     def destroy(self) -> None:
         """Free all PETSc objects; collective."""
         self._give_up()
-        self._forget_replaced()
+        self.pairing.forget()
         self.tangent.destroy()
 
 
