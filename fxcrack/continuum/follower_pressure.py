@@ -63,9 +63,9 @@ class FollowerPressure(Term):
         self._factor.value = self._load.amplitude(time)
 
     def path_work(self, u: fem.Function) -> float:
-        """Work along the straight way from the last state; exact, by Simpson's rule.
+        """Work along the straight path from the last state; exact, by Simpson's rule.
 
-        Force and displacement are linear on the way, the deformed area at most quadratic.
+        Force and displacement are linear on the path, the deformed area at most quadratic.
         """
         c = self._continuum
         if self._power is None:
@@ -83,7 +83,7 @@ class FollowerPressure(Term):
         return float(c.comm.allreduce(work, op=MPI.SUM))
 
     def commit(self, u: fem.Function) -> None:
-        """Add the work along the straight way from the last state."""
+        """Add the work along the straight path from the last state."""
         self._work += self.path_work(u)
         self._last[:] = u.x.array
         self._last_factor = float(self._factor.value)

@@ -75,7 +75,7 @@ class Term:
         return {}
 
     def path_work(self, u: fem.Function) -> float:
-        """Work it does on the bodies on the straight way from the last commit to u; collective."""
+        """Work it does on the bodies on the straight path from the last commit to u; collective."""
         return 0.0
 
     def work(self) -> float:
@@ -87,7 +87,7 @@ class Term:
         return 0.0
 
     def state(self) -> dict[str, Array]:
-        """AcceptedFriction state of this rank; empty where there is none."""
+        """Committed state of this rank; empty where there is none."""
         return {}
 
     def places(self) -> dict[str, Place]:

@@ -2,7 +2,7 @@
 
     r(u) = sum of the terms' residuals,    K(u) = sum of their tangents
 
-Dead loads are not in here: they are borders of the condensed system.
+Dead loads are not in here: they are border columns of the condensed system.
 """
 
 from __future__ import annotations
@@ -201,7 +201,7 @@ class WeakForm:
         return out
 
     def path_work(self) -> float:
-        """Work the terms do on the straight way from the last commit to here; collective."""
+        """Work the terms do on the straight path from the last commit to here; collective."""
         return sum(term.path_work(self.u) for term in self.terms)
 
     def work(self) -> float:
@@ -222,7 +222,7 @@ class WeakForm:
             self._add(term.name, start)
 
     def state(self) -> dict[str, Array]:
-        """AcceptedFriction state: positions, displacement and what the terms remember; collective.
+        """Committed state: positions, displacement and what the terms remember; collective.
 
         Returns:
             On rank 0, fields in the order of :class:`FileOrder`.

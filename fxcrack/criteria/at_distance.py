@@ -19,7 +19,7 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.criteria.evaluator import Evaluator
 from fxcrack.criteria.probe import FrontProbe
-from fxcrack.interface.surface_paths import SurfacePaths, Way, locate
+from fxcrack.interface.surface_paths import SurfacePath, SurfacePaths, locate
 from fxcrack.interface.tips import Tips
 
 _ROUND_OFF = 1e-11
@@ -106,7 +106,7 @@ class _AtDistance(Evaluator):
         return f"interface '{self.probe.pair.title}', tip at ({place})"
 
 
-def _on_face(way: Way, points: Array, distance: float, order: int) -> tuple[Ints, Array]:
-    """Nodes and weights of the place on a way at a distance from its beginning."""
+def _on_face(path: SurfacePath, points: Array, distance: float, order: int) -> tuple[Ints, Array]:
+    """Nodes and weights of the point on a path at a distance from its beginning."""
     rows, weights = locate("path", points, distance, order)
-    return way.nodes[rows], weights
+    return path.nodes[rows], weights

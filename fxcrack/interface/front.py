@@ -1,4 +1,4 @@
-"""Crack tips and fronts on a slave surface: where, which way, how far to the neighbours.
+"""Crack tips and fronts on a slave surface: place, growth direction, distances to neighbours.
 
 A front node is a bonded slave node with an open neighbour along an edge. Its growth direction s is
 minus the gradient of the open/bonded indicator over the facets around it, so it needs no
@@ -39,6 +39,16 @@ class Front:
         bonded: Initially bonded nodes, shape (n_nodes,).
         title: Name of the interface in messages.
 
+    Attributes:
+        surface: The slave surface where it is now (:meth:`follow`).
+        title: Name of the interface.
+        bonded: Nodes bonded now, shape (n_nodes,).
+        version: Counts the changes of ``bonded``.
+        placed: Counts the changes of position.
+        tied: Bonded nodes that are no front nodes, shape (n_nodes,).
+        links: Per node the ends and midside nodes (-1 in first order) of its edges, shape
+            (n_edges, 2).
+
     Raises:
         InterfaceError: A second-order tip starts at a midside node.
     """
@@ -68,7 +78,8 @@ class Front:
         both = np.concatenate([links, links[:, [1, 0, 2]]])
         both = both[np.lexsort((both[:, 1], both[:, 0]))]
         split = np.searchsorted(both[:, 0], np.arange(1, surface.n_nodes))
-        self._links = np.split(both[:, 1:], split)
+        self.links = np.split(both[:, 1:], split)
+        self._near = self._pad_links()
         self._is_middle = np.zeros(surface.n_nodes, dtype=bool)
         if surface.order == 2:
             self._check_middles(facets)
@@ -148,7 +159,7 @@ class Front:
         self._set(nodes, bonded=False)
 
     def bond(self, nodes: Ints) -> None:
-        """Take back a release that led nowhere."""
+        """Bond nodes again whose release is undone."""
         self._set(nodes, bonded=True)
 
     def _set(self, nodes: Ints, *, bonded: bool) -> None:
@@ -163,7 +174,7 @@ class Front:
 
     def neighbours(self, node: int) -> Ints:
         """Nodes linked to a node along an edge."""
-        return np.asarray(self._links[node][:, 0])
+        return np.asarray(self.links[node][:, 0])
 
     def candidates(self) -> Ints:
         """Front nodes, ascending.
@@ -178,8 +189,6 @@ class Front:
                 "or tie it (Scene(bonds=...))"
             )
         bonded = np.flatnonzero(self.bonded & ~self._is_middle & ~self.tied)
-        if not hasattr(self, "_near"):
-            self._near = self._pad_links()
         ends, middles = self._near
         far = ends[bonded]
         is_open = (far >= 0) & ~self.bonded[far]
@@ -194,10 +203,10 @@ class Front:
         return bonded[is_open.any(axis=1)]
 
     def _pad_links(self) -> tuple[Ints, Ints]:
-        width = max(len(link) for link in self._links)
+        width = max(len(link) for link in self.links)
         ends = np.full((self.surface.n_nodes, width), -1, dtype=np.int64)
         middles = np.full((self.surface.n_nodes, width), -1, dtype=np.int64)
-        for i, link in enumerate(self._links):
+        for i, link in enumerate(self.links):
             ends[i, : len(link)], middles[i, : len(link)] = link[:, 0], link[:, 1]
         return ends, middles
 
@@ -313,7 +322,7 @@ class Front:
 
     def _tip_on_lines(self, node: int, s: FacetSurface) -> Tip:
         heading = self._heading[node] if self._heading is not None else np.zeros(3)
-        links = self._links[node]
+        links = self.links[node]
         vectors = s.x[links[:, 0]] - s.x[node]
         length = np.linalg.norm(vectors, axis=1)
         is_open = ~self.bonded[links[:, 0]] & ~self.bonded[links[:, 1]]

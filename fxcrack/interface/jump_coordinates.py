@@ -64,7 +64,7 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 FIXED, FREE, RETAINED = 0, 1, 2
-"""Roles of a jump component: zero for good, free in the continuum, or retained."""
+"""Roles of a jump component: always zero, free in the continuum, or retained."""
 
 
 @dataclass

@@ -268,7 +268,7 @@ def grown_together(slave: FacetSurface, master: FacetSurface, where: str) -> Boo
     """Slave nodes that are master nodes as well, shape (n_slave,).
 
     An interface that ends inside a body has such nodes along its border, where its two sides face
-    each other as everywhere; they are bonded for good and no crack passes them.
+    each other as everywhere; they stay bonded and no crack passes them.
 
     Raises:
         InterfaceError: The surfaces share nodes but do not face each other there.

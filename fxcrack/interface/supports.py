@@ -126,21 +126,21 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
 def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
     """Warn where supports on both faces keep bonds from ever opening.
 
-    Supports that only stop faces from sliding (planes of symmetry, axes) are the usual case and go
-    without a word.
+    Supports that only stop faces from sliding (planes of symmetry, axes) are the usual case and
+    need no warning.
 
     Args:
         pair: Interface.
         held: Jump components that supports hold, shape (n_nodes, gdim).
     """
-    stuck = np.flatnonzero(held[:, 0] & pair.bonded)
-    if len(stuck):
+    fixed = np.flatnonzero(held[:, 0] & pair.bonded)
+    if len(fixed):
         log.warn(
             "interface '%s': supports hold both faces at %d of its bonded nodes, one of them at "
             "%s; those bonds cannot open and show no force",
             pair.title,
-            len(stuck),
-            format_point(pair.surface.x[stuck[0]]),
+            len(fixed),
+            format_point(pair.surface.x[fixed[0]]),
         )
 
 

@@ -1,4 +1,4 @@
-"""A named facet group as a small mesh of its own, replicated whole on every rank.
+"""A named facet group as a small mesh of its own, whole on every rank.
 
 Nodes are displacement nodes (so a second-order displacement brings midside nodes); their order
 and that of the facets follow the input order of the cells and not the partition.

@@ -1,6 +1,6 @@
-"""Walking along a slave surface from a tip, over the bonded part ahead or the open part behind.
+"""Paths along a slave surface from a tip, over the bonded part ahead or the open part behind.
 
-On a line (2-D) the way is the line itself, whatever its shape. On a surface (3-D) it is the mesh
+On a line (2-D) the path is the line itself, whatever its shape. On a surface (3-D) it is the mesh
 line most nearly along the growth direction; each step counts with its component in that direction,
 
     s_(k+1) = s_k + (x_(k+1) - x_k) . t_k,    t_k the direction in the tangent plane at node k,
@@ -26,12 +26,12 @@ from fxcrack.interface.surface import FacetSurface
 from fxcrack.interface.tips import Tips
 
 _ALIGNED = 0.1
-"""Least cosine between a step and the direction of the way on a surface (3-D)."""
+"""Least cosine between a step and the direction of the path on a surface (3-D)."""
 
 
 @dataclass(frozen=True)
-class Way:
-    """A way along the nodes of a slave surface.
+class SurfacePath:
+    """A path along the nodes of a slave surface.
 
     Attributes:
         nodes: From the tip on, shape (m,); second order: corner, midside, corner, ...
@@ -71,7 +71,7 @@ class Origins:
 
 
 class SurfacePaths:
-    """Ways along one slave surface, and where the present tips come from.
+    """Paths along one slave surface, and where the present tips come from.
 
     Args:
         front: Front of the interface in its initial state, which is remembered.
@@ -99,8 +99,8 @@ class SurfacePaths:
         """The slave surface where it is now."""
         return self._front.surface
 
-    def ahead(self, tips: Tips, i: int, reach: float) -> Way:
-        """Way over bonded nodes ahead of a tip, until it is ``reach`` long or no node follows.
+    def ahead(self, tips: Tips, i: int, reach: float) -> SurfacePath:
+        """Path over bonded nodes ahead of a tip, until it is ``reach`` long or no node follows.
 
         Args:
             tips: Present front.
@@ -110,8 +110,8 @@ class SurfacePaths:
         growth = tips.frame[i, :, 1]
         return self._walk(int(tips.node[i]), growth, self._front.bonded, reach, straight=False)
 
-    def behind(self, tips: Tips, i: int, reach: float, inside: Bools) -> Way:
-        """Way backwards from a tip, until a node is ``reach`` away from it or none follows.
+    def behind(self, tips: Tips, i: int, reach: float, inside: Bools) -> SurfacePath:
+        """Path backwards from a tip, until a node is ``reach`` away from it or none follows.
 
         Args:
             tips: Present front.
@@ -125,9 +125,9 @@ class SurfacePaths:
     def origins(self, tips: Tips) -> Origins:
         """Origin of every present tip on the initial front, and the length grown from there.
 
-        On a line: the first node on the way back behind which the surface was open from the
+        On a line: the first node on the path back behind which the surface was open from the
         beginning. On a surface: the foot of the perpendicular on the initial front, a chain of
-        straight pieces between its nodes. The length is that of the straight way between the two,
+        straight pieces between its nodes. The length is that of the straight line between the two,
         laid on the surface (exact on planes, and across the axis of cylinders).
         """
         if self._surface.dim == 2:
@@ -140,8 +140,8 @@ class SurfacePaths:
         node, grown = tips.node.copy(), np.zeros(len(tips))
         for i in range(len(tips)):
             back = -tips.frame[i, :, 1]
-            way = self._walk(int(node[i]), back, self._was_bonded, np.inf, straight=False)
-            node[i], grown[i] = way.nodes[-1], way.s[-1]
+            path = self._walk(int(node[i]), back, self._was_bonded, np.inf, straight=False)
+            node[i], grown[i] = path.nodes[-1], path.s[-1]
         return Origins(np.stack([node, node], axis=1), np.tile([1.0, 0.0], (len(node), 1)), grown)
 
     def _initial_pieces(self) -> Ints:
@@ -154,7 +154,7 @@ class SurfacePaths:
         return np.array(pieces, dtype=np.int64).reshape(-1, 2)
 
     def _trace(self, nodes: Ints) -> None:
-        """Find the origins of nodes on a surface; they stay the same for good."""
+        """Find the origins of nodes on a surface; they do not change any more."""
         x = self._surface.x
         a, b = self._pieces.T
         along = x[b] - x[a]
@@ -169,20 +169,20 @@ class SurfacePaths:
             self._grown[node] = self._laid(foot, x[node])
 
     def _laid(self, start: Array, end: Array) -> float:
-        """Length of the straight way between two points laid on the surface."""
+        """Length of the straight line between two points, projected on the surface."""
         straight = float(np.linalg.norm(end - start))
         normals = self._surface.normals
         if straight == 0.0 or np.abs(normals - normals[0]).max() < 1e-9:
             return straight
         steps = 4 * math.ceil(straight / self.longest)
-        way = start + np.linspace(0.0, 1.0, steps + 1)[:, None] * (end - start)
+        line = start + np.linspace(0.0, 1.0, steps + 1)[:, None] * (end - start)
         return float(
-            np.linalg.norm(np.diff(project(way, self._surface).foot, axis=0), axis=1).sum()
+            np.linalg.norm(np.diff(project(line, self._surface).foot, axis=0), axis=1).sum()
         )
 
     def _walk(
         self, start: int, direction: Array, inside: Bools, reach: float, *, straight: bool
-    ) -> Way:
+    ) -> SurfacePath:
         x = self._surface.x
         nodes, s = [start], [0.0]
         here, drift = start, np.zeros(3)
@@ -198,22 +198,22 @@ class SurfacePaths:
             for k in (middle, end):
                 if k < 0:
                     continue
-                way = x[k] - x[nodes[-1]]
+                step_to = x[k] - x[nodes[-1]]
                 if self._surface.dim == 1:
-                    s.append(s[-1] + float(np.linalg.norm(way)))
+                    s.append(s[-1] + float(np.linalg.norm(step_to)))
                 else:
-                    s.append(s[-1] + float(way @ self._tangent(nodes[-1], direction)))
+                    s.append(s[-1] + float(step_to @ self._tangent(nodes[-1], direction)))
                 nodes.append(k)
             direction, drift = self._carry(here, end, direction, drift)
             seen.add(end)
             here = end
-        return Way(np.array(nodes, dtype=np.int64), np.array(s), x[nodes])
+        return SurfacePath(np.array(nodes, dtype=np.int64), np.array(s), x[nodes])
 
     def _next(
         self, here: int, direction: Array, drift: Array, seen: set[int]
     ) -> tuple[int, int] | None:
         """Midside node (-1 in first order) and end of the next edge; ``None`` at an end."""
-        links = self._front._links[here]
+        links = self._front.links[here]
         new = [k for k in range(len(links)) if int(links[k, 0]) not in seen]
         if not new:
             return None
@@ -222,7 +222,7 @@ class SurfacePaths:
         advance = vectors @ t
         length = np.linalg.norm(vectors, axis=1)
         if self._surface.dim == 1:
-            # a line has one way on; at its first node two, of which one is not backwards
+            # a line goes on in one direction; from its first node in two, one of them backwards
             best = int(np.argmax(advance / length))
             if len(seen) == 1 and advance[best] <= 0.0:
                 return None
@@ -245,7 +245,7 @@ class SurfacePaths:
         return np.asarray(t / length) if length > 0.0 else direction
 
     def _carry(self, here: int, end: int, direction: Array, drift: Array) -> tuple[Array, Array]:
-        """Direction after a step, and how far the way has left the straight line sideways."""
+        """Direction after a step, and how far the path is beside the straight line."""
         step = self._surface.x[end] - self._surface.x[here]
         if self._surface.dim == 1:
             return step, drift
