@@ -282,7 +282,7 @@ PRISM = [0.0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 1, 0, 1, 0, 1, 1]
 FAULTS: list[tuple[str, Callable[[Any], None]]] = [
     (
         "no triangles, quadrilaterals.*mesh the model",
-        lambda g: g.solver.occ.addBox(0, 0, 0, 1, 1, 1),
+        lambda g: g.model.occ.addBox(0, 0, 0, 1, 1, 1),
     ),
     ("2 kinds.*triangle.*recombine", mixed),
     ("without centre nodes.*SecondOrderIncomplete", lambda g: discrete(g, 16, [QUAD8])),
