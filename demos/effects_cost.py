@@ -77,16 +77,16 @@ def main(out: Path, fine: bool = False) -> None:
             name,
             seconds,
             seconds / bare,
-            found.path,
+            found.solver,
             str(found.counts["form terms"]),
             str(found.counts["factorisations"]),
-            str(found.unknowns["jumps in the window"]),
+            str(found.unknowns["retained jumps"]),
         ]
         for name, seconds, found in ladder
     ]
     table(
         "Seconds of one specimen with one effect more",
-        ["effect", "s", "over bare", "path", "form terms", "factorisations", "jumps"],
+        ["effect", "s", "over bare", "solver", "form terms", "factorisations", "jumps"],
         rows,
     )
 

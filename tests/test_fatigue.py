@@ -270,7 +270,7 @@ def test_criterion_and_step_must_go_together(comm):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1))
     scene.close()
     scene = fatigue_specimen(comm, release=fx.ProgressiveRelease())
-    with pytest.raises(fx.InputError, match=r"let go at once; use release=Step\(\)"):
+    with pytest.raises(fx.InputError, match=r"released at once; use release=StepRelease\(\)"):
         scene.run(fx.Cycles(maximum=1.0, ratio=0.1))
     scene.close()
 

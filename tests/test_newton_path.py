@@ -141,7 +141,7 @@ def test_unloading_to_nothing_and_loading_the_other_way(finite: bool, first: flo
             ],
             contact=True,
             effects=[FiniteStrain()] if finite else [],
-            path="newton",
+            solver="newton",
         )
         step = fx.Static(until=fx.Time(len(pins) - 1.0), stepping="increment", maximum=0.5)
         return scene.run(step)

@@ -147,7 +147,7 @@ def test_a_controlled_deflection_is_a_prescribed_one() -> None:
     [
         ({}, {"opening": "pin_topp"}, "did you mean 'pin_top'"),
         ({}, {"opening": "pin_bottom"}, "in its positive direction"),
-        ({"release": fx.ProgressiveRelease()}, {}, "lets go progressively"),
+        ({"release": fx.ProgressiveRelease()}, {}, "is released progressively"),
         ({"faces": {"contact": True, "friction": 0.2}}, {}, "leave friction out"),
     ],
 )

@@ -27,7 +27,7 @@ from fxcrack.base.parallel import all_or_none
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
-VERSION = 3
+VERSION = 4
 """Changes when a file of an earlier program can no longer be read."""
 
 

@@ -39,8 +39,8 @@ class Cycles:
     piece without a change of contact they follow from its two ends exactly; other pieces are
     halved until they are known to ``change`` of G_max.
 
-    Bonds let go at the maximum of the cycle (with ``period`` at its corner of largest f), where
-    the step ends, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
+    Bonds are released at the maximum of the cycle (with ``period`` at its corner of largest f);
+    the step ends there, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
 
     Args:
         maximum: Time of the largest loads.
@@ -169,8 +169,8 @@ def check_criteria(step: Static | Cycles, debonds: Sequence[Debond]) -> None:
             )
         if not isinstance(debond.release, StepRelease):
             raise InputError(
-                f"{who}: in cycles bonds let go at once; use release=Step() (the default) "
-                f"instead of {type(debond.release).__name__}"
+                f"{who}: in cycles bonds are released at once; use release=StepRelease() (the "
+                f"default) instead of {type(debond.release).__name__}"
             )
     if isinstance(step, Cycles) and not debonds:
         raise InputError("Cycles: no interface may grow in this step; give a Debond with Fatigue")

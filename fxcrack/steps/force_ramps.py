@@ -1,4 +1,4 @@
-"""Bonds that let go with time or over increments: a known fraction of the force remains."""
+"""Bonds released with time or over increments: a known fraction of their force remains."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.criteria import AmplitudeRelease, RampRelease
 from fxcrack.criteria import Release as ReleaseLaw
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
+from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.friction_state import contact_share
 from fxcrack.solvers.linear import LinearSolver
 
@@ -38,7 +39,7 @@ class PrescribedRamp:
     def begin(
         cls, solver: LinearSolver, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> PrescribedRamp:
-        """Note the bond forces of nodes that are about to let go."""
+        """Note the bond forces of nodes that are about to be released."""
         if not isinstance(law, AmplitudeRelease | RampRelease):
             raise InputError(f"{type(law).__name__} is no release with time or increments")
         return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
@@ -53,10 +54,25 @@ class PrescribedRamp:
         return float(self.law.remaining(now - self.start))
 
     def breaks(self) -> tuple[float, ...]:
-        """Times at which the amplitude bends."""
+        """Times at which the amplitude changes its slope."""
         if not isinstance(self.law, AmplitudeRelease):
             return ()
         return tuple(self.start + t for t in self.law.times)
+
+    def first_increment(self, time: float) -> float:
+        """Increment the amplitude suggests where the release begins at a time, else infinite."""
+        if not isinstance(self.law, AmplitudeRelease) or self.start != time:
+            return np.inf
+        return self.law.suggested_increment
+
+    def accept(self, time: float, solver: LinearSolver) -> None:
+        """Nothing to do: the force depends on the time or the increment alone."""
+
+    def viscous_part(
+        self, solver: LinearSolver, spent: float, ends: tuple[Equilibrium, Equilibrium]
+    ) -> float:
+        """Energy of a piece that viscosity took: none."""
+        return 0.0
 
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time or the number of the increment."""
@@ -99,6 +115,16 @@ class ViscousRamp:
     def breaks(self) -> tuple[float, ...]:
         """None: the force is known at increments only."""
         return ()
+
+    def first_increment(self, time: float) -> float:
+        """Infinite: no increment is suggested."""
+        return np.inf
+
+    def viscous_part(
+        self, solver: LinearSolver, spent: float, ends: tuple[Equilibrium, Equilibrium]
+    ) -> float:
+        """Energy of a piece that viscosity took: all that left through these bonds."""
+        return spent
 
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time."""
@@ -149,7 +175,7 @@ class ViscousCohesiveRamp:
         """Note the bond forces of nodes that are about to soften.
 
         Args:
-            solver: The model.
+            solver: The solver.
             p: Number of the pair.
             units: What softens by one law each.
             viscosity: mu, time.
@@ -193,6 +219,23 @@ class ViscousCohesiveRamp:
         """None: the force is known at increments only."""
         return ()
 
+    def first_increment(self, time: float) -> float:
+        """Infinite: no increment is suggested."""
+        return np.inf
+
+    def viscous_part(
+        self, solver: LinearSolver, spent: float, ends: tuple[Equilibrium, Equilibrium]
+    ) -> float:
+        """Energy of a piece that viscosity took: what left beyond the law's fracture energy.
+
+        Args:
+            solver: The solver.
+            spent: Energy that left through these bonds on the piece, force times length.
+            ends: Equilibria at both ends of the piece.
+        """
+        before, after = (self.fracture_energy(solver, state.jump) for state in ends)
+        return spent - (after - before)
+
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time."""
         return time
@@ -205,7 +248,7 @@ def _sizes(force: Array, unit: Ints) -> Array:
 
 
 ForceRamp = PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
-"""Bonds whose force is given while they let go."""
+"""Bonds whose force is given while they are released."""
 
 _SPENT = 1e-12
 """Bonds of which less than this fraction of the force is left are free."""
@@ -219,7 +262,7 @@ def still_pulling(ramps: Sequence[ForceRamp], time: float, increment: int) -> li
 def bond_forces_of(solver: LinearSolver, p: int, nodes: Ints) -> Array:
     """Forces on the slave side of bonded nodes in jump components, shape (n, gdim).
 
-    With friction, less what contact takes over at once.
+    With friction, less the part that contact carries at once.
     """
     index = solver.index[p][nodes]
     inside = (index >= 0) & ~solver.system.free[np.maximum(index, 0)]
