@@ -40,7 +40,8 @@ class Cycles:
     halved until they are known to ``change`` of G_max.
 
     Bonds are released at the maximum of the cycle (with ``period`` at its corner of largest f);
-    the step ends there, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
+    the step ends there, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any
+    more.
 
     Args:
         maximum: Time of the largest loads.

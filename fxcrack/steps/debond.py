@@ -104,7 +104,8 @@ def _warn_of_neutral_onset(criterion: VCCT, title: str) -> None:
     if criterion.method == "closure" and not isinstance(criterion, EnhancedVCCT):
         log.warn(
             "interface '%s': a bond whose onset is found by method='closure' is neutral there and "
-            "opens at once, as with StepRelease, though its release is to follow the opening; wide fronts carry a third too much so. Take method='vcct', or use StepRelease",
+            "opens at once, as with StepRelease, though its release is to follow the opening; wide "
+            "fronts then carry a third too much load. Take method='vcct', or use StepRelease",
             title,
         )
 
