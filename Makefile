@@ -7,6 +7,9 @@ help: ## this list
 demo: $(ready) ## grow a crack through a double cantilever beam; plots in out/dcb
 	.venv/bin/python demos/dcb.py --out out/dcb
 
+smoke: $(ready) ## the essential path, in a minute
+	.ci/test smoke
+
 test: $(ready) ## quick tests: serial, on 2 and on 3 ranks
 	.ci/test quick
 
@@ -35,4 +38,4 @@ distclean: clean ## remove the environment too
 $(ready): pyproject.toml .ci/bootstrap
 	.ci/bootstrap
 
-.PHONY: help demo test test-slow test-all lint bench clean distclean
+.PHONY: help demo smoke test test-slow test-all lint bench clean distclean

@@ -3,6 +3,10 @@
 On several ranks the same tests run in the same order everywhere. After each phase of a test the
 ranks agree on its outcome: a test that fails on one rank fails on all, and a rank that failed while
 another is stuck in a collective call ends the job instead of hanging with it.
+
+No test may take longer than its limit, see LIMITS. One that does is named, with the lines at which
+each rank stands, and ends the job on all ranks. A failure is named when it happens, so that a run
+which is cut short has told what failed until then.
 """
 
 from __future__ import annotations
@@ -12,11 +16,15 @@ import os
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # ranks share the cores
 os.environ.setdefault("MPLBACKEND", "Agg")
 
+import faulthandler
+import fnmatch
 import gc
+import signal
 import sys
 import time
 from collections.abc import Generator, Iterator
 from pathlib import Path
+from typing import TextIO
 
 import fxcrack  # noqa: F401 - before petsc4py
 
@@ -32,17 +40,131 @@ from fxcrack.base.parallel import end_all
 hypothesis.settings.register_profile("fxcrack", derandomize=True, deadline=None, database=None)
 hypothesis.settings.load_profile("fxcrack")
 
+if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
+    # A shell gave it to a job in the background; tests send it.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
 WORLD = MPI.COMM_WORLD
 PATIENCE = 30.0  # seconds a failed rank waits for the others: longer than compiling a form
 
 # Its own communicator: a test cut short by an error cannot mix up its messages.
 OUTCOMES = WORLD.Dup()
 
+LIMITS = {"quick": 120.0, "slow": 600.0}
+"""Seconds one test may take: ten times what the longest ones need. They grow with the load of the
+machine; FXCRACK_TEST_PATIENCE, a number, multiplies them on one that is slow by itself."""
+
+
+class Watchdog:
+    """Ends this process, and with it all ranks, when a test exceeds its limit.
+
+    The timer of faulthandler is a thread in C. A timer in Python would wait for the interpreter
+    lock, which calls into PETSc and DOLFINx keep, also those that never return.
+
+    The folder FXCRACK_TESTS_RUNNING, if set, holds one file per process: the test it runs and, past
+    the limit, where it stands. It tells which test a process that died was running, too.
+    """
+
+    def __init__(self, patience: float, folder: str | None) -> None:
+        self.patience = patience
+        self._file: TextIO
+        if folder is None:
+            self._file = os.fdopen(os.dup(2), "w")  # 2 itself is captured during tests
+        else:
+            self._file = (Path(folder) / f"rank{WORLD.rank}-{os.getpid()}").open("w")
+        self._named = folder is not None
+
+    def start(self, item: pytest.Item) -> None:
+        """Give the test all of its time."""
+        kind = "slow" if item.get_closest_marker("slow") else "quick"
+        load = os.getloadavg()[0] / (os.cpu_count() or 1)
+        limit = LIMITS[kind] * self.patience * max(1.0, load)
+        if self._named:
+            self._write(f"{item.nodeid} - cut short on rank {WORLD.rank}, limit {limit:.3g} s\n")
+        faulthandler.dump_traceback_later(limit, exit=True, file=self._file)
+
+    def stop(self) -> None:
+        """The test has ended."""
+        faulthandler.cancel_dump_traceback_later()
+        if self._named:
+            self._write("")
+
+    def _write(self, text: str) -> None:
+        self._file.seek(0)
+        self._file.truncate()
+        self._file.write(text)
+        self._file.flush()
+
+
+WATCHDOG = pytest.StashKey[Watchdog]()
+
 
 @pytest.hookimpl(trylast=True)
 def pytest_configure(config: pytest.Config) -> None:
+    config.stash[WATCHDOG] = Watchdog(
+        float(os.environ.get("FXCRACK_TEST_PATIENCE", "1")), os.environ.get("FXCRACK_TESTS_RUNNING")
+    )
     if WORLD.rank > 0:  # rank 0 speaks for all
         config.pluginmanager.unregister(name="terminalreporter")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, object, object]:
+    watchdog = item.config.stash[WATCHDOG]
+    watchdog.start(item)
+    try:
+        return (yield)
+    finally:
+        watchdog.stop()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_teardown(item: pytest.Item) -> None:
+    item.config.stash[WATCHDOG].start(item)  # pytest stops the timer after a failure
+
+
+class FailuresAtOnce:
+    """Names each failed test when it fails."""
+
+    def __init__(self, terminal: pytest.TerminalReporter) -> None:
+        self._terminal = terminal
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Write one line below the dots."""
+        if report.failed:
+            crash = getattr(report.longrepr, "reprcrash", None)
+            why = (crash.message if crash else str(report.longrepr)).partition("\n")[0]
+            word = "FAILED" if report.when == "call" else "ERROR"
+            self._terminal.ensure_newline()
+            self._terminal.write_line(f"{word} {report.nodeid} - {why}")
+            self._terminal.flush()
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    plugins = session.config.pluginmanager
+    if terminal := plugins.getplugin("terminalreporter"):
+        plugins.register(FailuresAtOnce(terminal))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_pycollect_makeitem(
+    collector: pytest.Collector,
+) -> Generator[None, object, object]:
+    """Mark as slow what the mark "quick" of a test leaves out."""
+    made = yield
+    items = [i for i in made if isinstance(i, pytest.Item)] if isinstance(made, list) else []
+    quick = items[0].get_closest_marker("quick") if items else None
+    if quick is None:
+        return made
+    names = [item.name.partition("[")[2].removesuffix("]") for item in items]
+    for pattern in quick.args:
+        if not fnmatch.filter(names, pattern):
+            raise collector.CollectError(f"quick: {pattern!r} is none of {', '.join(names)}")
+    for item, name in zip(items, names, strict=True):
+        if not any(fnmatch.fnmatchcase(name, pattern) for pattern in quick.args):
+            item.add_marker("slow")
+    return made
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

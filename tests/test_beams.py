@@ -11,6 +11,7 @@ T300 = CorrectedBeam(E=139.4e3, E22=10.16e3, G=4.6e3, h=1.5, b=25.0)
 IM7 = CorrectedBeam(E=161.0e3, E22=11.38e3, G=5.2e3, h=2.25, b=25.4)
 
 
+@pytest.mark.smoke
 def test_double_cantilever() -> None:
     """NASA/TM-2008-215123: all digits given."""
     a = np.array([30.0, 31.0, 32.0, 33.0, 34.0, 35.0, 40.0])
@@ -21,6 +22,7 @@ def test_double_cantilever() -> None:
     assert T300.dcb_load_at_opening(2.0 * half, 0.1703) == pytest.approx(load, rel=1e-12)
 
 
+@pytest.mark.smoke
 def test_end_notched_flexure() -> None:
     a = np.array([25.4, 30.0, 35.0, 40.0, 45.0])
     load = IM7.enf_load(a, 0.774)
@@ -28,6 +30,7 @@ def test_end_notched_flexure() -> None:
     assert IM7.enf_rate(a, load) == pytest.approx(np.full(5, 0.774), rel=1e-12)
 
 
+@pytest.mark.smoke
 def test_mixed_mode_bending() -> None:
     """Ratios do not depend on the load; c = L/3 bends without opening; large c only opens."""
     c, half_span, a, p = 42.0, 50.0, 25.0, 100.0

@@ -72,6 +72,7 @@ def test_beam_load_is_that_of_the_closed_form() -> None:
 # -- the numbers ---------------------------------------------------------------------
 
 
+@pytest.mark.quick("0.5")
 @pytest.mark.mpi
 @pytest.mark.verification
 @pytest.mark.parametrize("dx", [0.5, 0.25, pytest.param(0.125, marks=pytest.mark.slow)])
@@ -126,6 +127,7 @@ def test_one_static_solve_starts_the_same_curve() -> None:
 # -- the report ----------------------------------------------------------------------
 
 
+@pytest.mark.quick("dcb2d")
 @pytest.mark.mpi
 @pytest.mark.parametrize("problem", [COARSE, COARSE_3D], ids=lambda p: p.name)
 def test_result_has_all_that_is_promised(problem: Problem) -> None:

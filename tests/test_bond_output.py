@@ -62,6 +62,7 @@ SCENES: dict[str, Callable[[], fx.Scene]] = {
 }
 
 
+@pytest.mark.quick("softening")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", SCENES)
 def test_remaining_stress_is_what_the_failed_bond_carries(name: str) -> None:

@@ -31,7 +31,7 @@ def run_on_two_ranks(program: str) -> subprocess.CompletedProcess[str]:
         [ROOT / ".ci" / "mpirun", *"-n 2 python3 -c".split(), program],
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=300,
         check=False,
     )
 
@@ -104,6 +104,7 @@ def test_a_demo_gets_its_folder_and_size(monkeypatch: pytest.MonkeyPatch, tmp_pa
     assert calls == [(Path("out/toy"), False), (tmp_path, True)]
 
 
+@pytest.mark.slow
 def test_bench_writes_its_numbers(capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     file = tmp_path / "new" / "bench.json"
     assert run("bench", "dcb2d", "--dx", "1", "--ny", "2", "--json", str(file)) == 0

@@ -72,6 +72,8 @@ CASES = {
 }
 
 
+@pytest.mark.three
+@pytest.mark.quick("a quarter", "one line")
 @pytest.mark.mpi
 @pytest.mark.parametrize("case", CASES)
 def test_schur_complement(comm: MPI.Intracomm, case: str) -> None:
@@ -147,6 +149,7 @@ MESHES = {
 }
 
 
+@pytest.mark.quick("2-D")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", MESHES)
 def test_columns_give_the_same(comm: MPI.Intracomm, name: str) -> None:
@@ -189,6 +192,7 @@ def test_support_whose_nodes_are_all_held_already(comm: MPI.Intracomm) -> None:
 # -- what MUMPS reports ----------------------------------------------------------------------------
 
 
+@pytest.mark.quick("slides-schur", "3-D-columns")
 @pytest.mark.mpi
 @pytest.mark.parametrize("method", ["schur", "columns"])
 @pytest.mark.parametrize(

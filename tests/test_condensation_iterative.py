@@ -170,6 +170,7 @@ def solved(mesh: Mesh, options: fx.CondensedOptions, **more: Any) -> tuple[Array
     return out
 
 
+@pytest.mark.quick("2-D-0.001", "3-D-0.001")
 @pytest.mark.mpi
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6])
 @pytest.mark.parametrize("name", MESHES)
@@ -194,6 +195,8 @@ def test_schur_complement_and_fields(comm: MPI.Intracomm, name: str, rtol: float
     assert np.abs(u - u_exact).max() < rtol * np.abs(u_exact).max()
 
 
+@pytest.mark.three
+@pytest.mark.quick("open")
 @pytest.mark.mpi
 @pytest.mark.parametrize("contact", [False, True], ids=["open", "contact"])
 def test_history_is_that_of_the_direct_solver(comm: MPI.Intracomm, contact: bool) -> None:
@@ -231,6 +234,7 @@ def test_history_in_3d(comm: MPI.Intracomm, release: Any) -> None:
     assert_same(*histories, HISTORY)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_columns_are_computed_once(comm: MPI.Intracomm) -> None:
     """Small windows, each of which needs only what lies farther ahead."""
@@ -249,6 +253,7 @@ def test_columns_are_computed_once(comm: MPI.Intracomm) -> None:
     scene.close()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_old_columns_are_dropped_where_memory_is_short(
     comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch

@@ -150,6 +150,7 @@ def test_contact_by_enumeration(seed: int) -> None:
         assert state.jump == pytest.approx(jump, abs=ROUND_OFF)
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(seeds)
 def test_work_along_pieces_is_the_energy_gained(seed: int) -> None:

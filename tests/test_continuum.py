@@ -225,6 +225,7 @@ LOADS: list[tuple[str, Load, tuple[float, ...]]] = [
 ]
 
 
+@pytest.mark.quick("plane")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", MODELS)
 def test_resultants(comm: MPI.Intracomm, name: str) -> None:
@@ -236,6 +237,7 @@ def test_resultants(comm: MPI.Intracomm, name: str) -> None:
             assert found == pytest.approx(expected, abs=1e-11 * 100.0), load
 
 
+@pytest.mark.quick("solid")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", MODELS)
 def test_stiffness(comm: MPI.Intracomm, name: str) -> None:

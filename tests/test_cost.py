@@ -200,6 +200,7 @@ def test_suite() -> None:
     assert [(c.dofs, c.ranks) for c in cases] == [(1e4, 2), (3e4, 2)] * 2
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_both_methods_measure_the_same_crack(comm: MPI.Intracomm) -> None:
     direct, iterative = (measure(Case("block", 1500, m), comm) for m in ("schur", "iterative"))
@@ -234,6 +235,7 @@ def test_dense_rates() -> None:
     assert all(v > 0.0 for v in dense_rate(200).values())
 
 
+@pytest.mark.slow
 def test_more_work_takes_longer() -> None:
     few, many = (unshared_rate(MPI.COMM_SELF, n) for n in (100_000, 10_000_000))
     assert many["memory"] > 5.0 * few["memory"] > 0.0

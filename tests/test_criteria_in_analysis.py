@@ -115,6 +115,7 @@ def assert_balanced(history: fx.History) -> None:
 # --- closed forms ---------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.verification
 @pytest.mark.convergence
 def test_centre_crack_starts_at_the_closed_form_load() -> None:
@@ -126,6 +127,7 @@ def test_centre_crack_starts_at_the_closed_form_load() -> None:
     ).all()  # a field in 1/sqrt(r) on even elements: first order
 
 
+@pytest.mark.slow
 @pytest.mark.verification
 def test_second_order_faces_start_at_the_closed_form_load() -> None:
     # twice the nodes of 20 first-order elements, and interpolation by parabolas
@@ -184,6 +186,7 @@ def test_penny_shaped_crack_starts_at_sneddons_load(quantity: str) -> None:
 # --- the criteria beside each other ---------------------------------------------------------------
 
 
+@pytest.mark.quick("1")
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 def test_circle_of_three_criteria(order: int) -> None:
@@ -204,6 +207,7 @@ RANKS = (261.560777198, 281.538426262)
 """Pressures at the first and the fifth release, on one rank."""
 
 
+@pytest.mark.quick("1-*")
 @pytest.mark.parametrize(
     "criterion",
     [fx.CriticalStress(30.0, distance=0.3), fx.CrackOpening(0.01, distance=1.2)],
@@ -274,6 +278,7 @@ CURVES = {
 }
 
 
+@pytest.mark.quick("straight-1")
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("curve", CURVES.values(), ids=CURVES)

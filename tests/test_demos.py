@@ -37,6 +37,7 @@ def balanced(history: fx.History) -> bool:
     return bool(np.abs(history["balance"]).max() <= 1e-6 * np.abs(history["external_work"]).max())
 
 
+@pytest.mark.smoke
 def test_dcb_is_close_to_beam_theory():
     scene, rows = dcb.run(dx=0.5, ny=4, until=35.0)
     # plane strain is 0.35 % above the theory, the coarse mesh another 0.6 %
@@ -94,6 +95,7 @@ def test_dcb3d_onset_loads_along_the_way(a):
     assert found["load"] == pytest.approx(dcb3d.PUBLISHED[round(a)], rel=0.03)  # the required 3 %
 
 
+@pytest.mark.slow
 def test_dcb3d_front_bows():
     scene = dcb3d.grow(dx=0.5, dy=1.25, ny=2, until=34.0)
     assert dcb3d.bow(scene) > 0.0
@@ -106,6 +108,7 @@ def test_enhanced_dcb_spends_the_propagation_toughness():
     assert balanced(scene.history)
 
 
+@pytest.mark.slow
 def test_front3d_progressive_release_spends_the_toughness():
     scene, found = front3d.run(fx.ProgressiveRelease(), until=42.0)
     assert found["dissipated"] == pytest.approx(front3d.G_IC, rel=0.015)  # the required 1.5 %
@@ -155,6 +158,7 @@ def test_pinch_keeps_the_slip_until_the_crack_opens():
     assert balanced(scene.history)
 
 
+@pytest.mark.slow
 def test_main_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     dcb.main(tmp_path)
     names = {p.name for p in tmp_path.iterdir()}
@@ -162,6 +166,7 @@ def test_main_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "61 releases, 1 factorisation(s)" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_large_rotation_follows_the_elastica() -> None:
     scene, rows = large_dcb.run(dx=0.5, ny=2, until=41.0)
     for a, opening, load, rate, _ in rows:
@@ -174,6 +179,7 @@ def test_large_rotation_follows_the_elastica() -> None:
     assert np.abs(scene.history["balance"]).max() <= 1e-4 * largest
 
 
+@pytest.mark.quick("None")
 @pytest.mark.parametrize("path", [None, "newton"])
 def test_a_bilayer_that_cools_releases_its_steady_rate(path: str | None) -> None:
     scene, rows = thermal_bilayer.run(dx=0.5, until=4.0, path=path)
@@ -184,6 +190,7 @@ def test_a_bilayer_that_cools_releases_its_steady_rate(path: str | None) -> None
     assert balanced(scene.history)
 
 
+@pytest.mark.slow
 def test_the_ladder_of_cost_counts_what_each_rung_adds() -> None:
     ladder = {name: found for name, _, found in effects_cost.run(dx=2.0, ny=1, until=34.0)}
     bare = ladder["bare"]

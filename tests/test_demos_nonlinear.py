@@ -72,6 +72,7 @@ def test_ductile_arms_carry_no_more_than_their_plastic_moment():
     assert largest_imbalance(history) < BALANCE
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_arms_of_high_yield_stress_are_elastic(comm: MPI.Intracomm):
     options = {"until": 31.0, "comm": comm, "dx": 1.0}

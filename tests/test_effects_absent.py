@@ -36,7 +36,7 @@ print(*sys.modules)
 @pytest.mark.slow
 def test_a_bare_scene_compiles_the_stiffness_alone() -> None:
     done = subprocess.run(
-        [sys.executable, "-c", BARE], capture_output=True, text=True, check=False, timeout=120
+        [sys.executable, "-c", BARE], capture_output=True, text=True, check=False, timeout=300
     )
     assert done.returncode == 0, done.stderr
     loaded = done.stdout.split()

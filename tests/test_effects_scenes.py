@@ -48,6 +48,7 @@ def test_plastic_arms_keep_their_books(comm: MPI.Intracomm) -> None:
     assert onsets(history)[0]["time"] > onsets(brittle)[0]["time"]
 
 
+@pytest.mark.quick("True")
 @pytest.mark.parametrize("contact", [pytest.param(False, marks=pytest.mark.mpi), True])
 def test_slow_dynamics_is_the_quasi_static_answer(comm: MPI.Intracomm, contact: bool) -> None:
     end = 1.0  # hundreds of periods of the arms

@@ -62,6 +62,7 @@ def history(mesh: fx.Mesh, *, contact: bool = False, **options: object) -> fx.Hi
     return found
 
 
+@pytest.mark.quick("1-True-options0")
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("order", "contact", "options"),

@@ -45,6 +45,7 @@ def test_a_bare_scene_has_one_term_one_factorisation_and_nothing_else() -> None:
     assert found.costs == {} and found.phases["factor_with_schur"] > 0.0
 
 
+@pytest.mark.quick("temperature", "contact", "finite strain", "friction", "plasticity")
 @pytest.mark.parametrize("name", EFFECTS)
 def test_an_effect_adds_what_it_needs(name: str, capsys: pytest.CaptureFixture[str]) -> None:
     material, more, words = EFFECTS[name]

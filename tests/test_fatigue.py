@@ -53,6 +53,7 @@ def test_cycles_add_up_to_the_sum_of_the_law():
     scene.close()
 
 
+@pytest.mark.slow
 @pytest.mark.verification
 @pytest.mark.demos
 def test_n_of_a_is_the_integral_of_the_paris_law_over_the_static_rate():

@@ -98,6 +98,7 @@ def pressed(comm: Any = MPI.COMM_WORLD) -> fx.Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_loads_out_of_step_with_contact_equal_their_sampled_cycle(comm):
     scene = pressed(comm)
@@ -303,6 +304,7 @@ def test_a_front_in_3d_stays_symmetric_and_keeps_its_energy():
         scene.close()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_ranks_agree(comm):
     for make, step in (

@@ -33,6 +33,7 @@ def pinned(name: str, x: float, y: float, angle: float, opening: float) -> list[
     ]
 
 
+@pytest.mark.slow
 def test_shear_of_a_pressed_unit_in_a_turned_specimen() -> None:
     """What exact closure holds is the normal of the turned faces."""
 
@@ -56,6 +57,7 @@ def test_shear_of_a_pressed_unit_in_a_turned_specimen() -> None:
     assert turned["GII[bond]"] == pytest.approx(checkpoint_point["GII[bond]"], rel=1e-6)
 
 
+@pytest.mark.quick("VCCT-80.0")
 @pytest.mark.parametrize("degrees", [80.0, 170.0])
 @pytest.mark.parametrize(
     ("criterion", "quantities"),
@@ -146,6 +148,7 @@ def slid(
     return scene, scene.run(step)
 
 
+@pytest.mark.slow
 def test_faces_that_slide_keep_the_energy_balance() -> None:
     histories = [slid(MPI.COMM_SELF, 2.0, dt)[1] for dt in (0.1, 0.05)]
     for history in histories:
@@ -157,6 +160,7 @@ def test_faces_that_slide_keep_the_energy_balance() -> None:
     assert 0.0 < taken[1] < 0.65 * taken[0]
 
 
+@pytest.mark.slow
 def test_so_do_faces_that_slide_with_inertia() -> None:
     _, history = slid(MPI.COMM_SELF, 2.0, 0.05, fx.Inertia(density=1e-3))
     assert history.rows[-1]["pairing_energy"] > 0.0

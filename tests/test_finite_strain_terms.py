@@ -53,6 +53,7 @@ CASES = [
 ]  # fmt: skip
 
 
+@pytest.mark.quick("plane *", "solid-1-NeoHookean")
 @pytest.mark.parametrize(("model", "order", "material"), CASES)
 def test_taylor(comm: MPI.Intracomm, model: str, order: int, material: Material) -> None:
     """Residual and tangent are first and second derivatives of the energy."""
@@ -71,6 +72,7 @@ def turn(angle: float) -> np.ndarray:
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
+@pytest.mark.quick("plane *")
 @pytest.mark.parametrize("material", [CARBON, fx.NeoHookean(E, NU)], ids=["svk", "neo"])
 @pytest.mark.parametrize("model", ["plane strain", "solid"])
 def test_a_rigid_rotation_is_free_of_force(
@@ -160,6 +162,7 @@ def test_uniaxial_svk_in_plane_stress(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_materials_side_by_side(comm: MPI.Intracomm) -> None:
     """Each law in its own cells: the energies add up, the names too."""
@@ -182,6 +185,7 @@ def test_materials_side_by_side(comm: MPI.Intracomm) -> None:
     both.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_inflated_ring(comm: MPI.Intracomm) -> None:
     """A ring that grows and lengthens uniformly: F = diag(b, l, b)."""
@@ -209,6 +213,7 @@ def test_plane_stress_is_refused(comm: MPI.Intracomm) -> None:
         fx.NeoHookean(E, 0.5)
 
 
+@pytest.mark.three
 @pytest.mark.mpi
 def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> None:
     """The bodies on all ranks and on this rank alone."""
@@ -223,6 +228,7 @@ def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> Non
     assert results[0] == pytest.approx(results[1], rel=1e-12)  # sums in another order
 
 
+@pytest.mark.quick("plane *")
 @pytest.mark.parametrize("model", MODELS)
 def test_stress_is_that_of_small_strain_when_small(comm: MPI.Intracomm, model: str) -> None:
     for material in (CARBON, fx.NeoHookean(E, NU)):

@@ -121,6 +121,7 @@ def test_bonded_by_a_chain_of_comparisons(comm: MPI.Comm) -> None:
         specimen(mesh(comm), interface=chain)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_pressure_by_functions(comm: MPI.Comm) -> None:
     def loads(value: object) -> list[fx.Pressure]:

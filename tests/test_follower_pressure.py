@@ -37,6 +37,7 @@ def pressed(
     return continuum, WeakForm(continuum, [FollowerPressure(continuum, load)])
 
 
+@pytest.mark.quick("plane *", "solid-1")
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("model", MODELS)
 def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:
@@ -55,6 +56,7 @@ def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane strain")
 @pytest.mark.parametrize("model", ["plane strain", "solid"])
 def test_force_turns_with_the_body(comm: MPI.Intracomm, model: str) -> None:
     """A rotated and stretched block: -p times the deformed area along the deformed normal."""
@@ -77,6 +79,7 @@ def test_force_turns_with_the_body(comm: MPI.Intracomm, model: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane strain")
 @pytest.mark.mpi
 @pytest.mark.parametrize("model", ["plane strain", "ring", "solid"])
 def test_work_is_pressure_times_volume(comm: MPI.Intracomm, model: str) -> None:
@@ -100,6 +103,7 @@ def test_work_is_pressure_times_volume(comm: MPI.Intracomm, model: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_energy_balance_of_a_ramp(comm: MPI.Intracomm) -> None:
     """Work of a growing pressure against the energy stored; the error falls with the square."""
@@ -122,6 +126,7 @@ def test_energy_balance_of_a_ramp(comm: MPI.Intracomm) -> None:
     assert errors[1] < 2e-3 and np.log2(errors[0] / errors[1]) > 1.8, errors
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     continuum = Continuum(

@@ -175,6 +175,7 @@ def test_the_path_in_the_plane_keeps_the_laws_and_the_energy(seed: int, m: int) 
     assert work == pytest.approx(energy + taken, abs=1e-11 * (1.0 + energy + taken))
 
 
+@pytest.mark.quick("1-2")
 @pytest.mark.parametrize(("seed", "m"), [(1, 2), (13, 4), (25, 6)])
 def test_the_path_in_space_keeps_the_laws_and_the_energy(seed: int, m: int) -> None:
     work, energy, taken = legs(seed, m, 3)
@@ -182,6 +183,7 @@ def test_the_path_in_space_keeps_the_laws_and_the_energy(seed: int, m: int) -> N
     assert work == pytest.approx(energy + taken, abs=1e-6 * (1.0 + energy + taken))
 
 
+@pytest.mark.slow
 @given(seed=seeds, m=st.integers(1, 8))
 @settings(max_examples=8)
 def test_many_increments_come_to_the_exact_path(seed: int, m: int) -> None:

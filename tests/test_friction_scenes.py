@@ -182,6 +182,8 @@ def test_in_space_the_block_slides_as_well_and_the_balance_closes(comm: MPI.Intr
     assert friction.error < 0.03 * history.rows[-1]["friction_energy"]
 
 
+@pytest.mark.three
+@pytest.mark.quick("2")
 @pytest.mark.mpi
 @pytest.mark.parametrize("gdim", [2, 3])
 def test_ranks_agree(comm: MPI.Intracomm, gdim: int) -> None:
@@ -402,6 +404,7 @@ def test_increments_come_to_the_same_end(comm: MPI.Intracomm) -> None:
         assert ends[1][name] == pytest.approx(ends[0][name], rel=1e-9)
 
 
+@pytest.mark.quick("3")
 @pytest.mark.mpi
 @pytest.mark.parametrize("rows", [3, 9])
 def test_a_restart_goes_on_as_if_nothing_had_been(

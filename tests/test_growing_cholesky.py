@@ -99,6 +99,30 @@ def test_unrestrained_unknown_changes_nothing(n_free: int, n_extra: int, pick: i
     assert_right(factor, matrix, np.random.default_rng(1))
 
 
+@pytest.mark.parametrize("stiffness", [0.0, 1e-6])
+def test_round_off_at_a_long_lever_holds_nothing(stiffness: float) -> None:
+    """A body that turns about a far support: the last unknown moves little, the others much.
+
+    An error of the entry that moves most comes back in the last pivot times the square of its
+    lever, far beyond the round-off of the last diagonal entry; a real stiffness is larger still.
+    """
+    lever = np.array([30.0, 20.0, 10.0, 5.0, 1.0])
+    project = np.eye(5) - np.outer(lever, lever) / (lever @ lever)
+    matrix = project @ spd(5, 1) @ project
+    matrix[0, 0] += 1e-11 + stiffness
+    factor = GrowingCholesky(matrix)
+    factor.round_off = np.full(5, 1e-10)
+    factor.append(np.arange(4))
+    pivot = float(factor.reduced(np.array([4]))[1][0, 0])
+    assert pivot == pytest.approx(lever[0] ** 2 * (1e-11 + stiffness), rel=1e-2)
+    if stiffness:
+        factor.append(np.array([4]))
+        assert len(factor) == 5
+    else:
+        with pytest.raises(NotPositiveDefinite):
+            factor.append(np.array([4]))
+
+
 def test_nothing_free() -> None:
     factor = GrowingCholesky(spd(5, 0))
     assert factor.solve(np.zeros(0)).shape == (0,)

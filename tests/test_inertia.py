@@ -81,6 +81,7 @@ def march(bodies: WeakForm, dt: float, steps: int) -> Array:
     return np.array([max(v) for v in zip(*c.comm.allgather(out), strict=True)])
 
 
+@pytest.mark.quick("hht")
 @pytest.mark.parametrize("method", METHODS)
 def test_order_in_the_increment(comm: MPI.Intracomm, method: str) -> None:
     """Half a period of one discrete motion: the error falls with the square of the increment."""
@@ -119,6 +120,7 @@ def exact_tip(bodies: WeakForm, effect: fx.Inertia, time: float) -> float:
     return float(u[2 * tip])
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.verification
 def test_bar_vibrates_at_its_frequency(comm: MPI.Intracomm) -> None:
@@ -154,6 +156,7 @@ def test_energies(comm: MPI.Intracomm, method: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 def test_rayleigh_damping(comm: MPI.Intracomm) -> None:
     """One motion decays with ratio (r_M/w + r_K w)/2; the energy it loses is counted."""
     for rayleigh in ((0.4, 0.0), (0.0, 0.02), (0.3, 0.01)):
@@ -224,6 +227,7 @@ def test_spectral_radius(method: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane *", "ring-False")
 @pytest.mark.parametrize("lumped", [False, True])
 @pytest.mark.parametrize("model", MODELS)
 def test_mass(comm: MPI.Intracomm, model: str, lumped: bool) -> None:
@@ -265,6 +269,7 @@ def test_tangent_is_assembled_once_per_length_of_the_increment(comm: MPI.Intraco
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     bodies = moving(comm, fx.Inertia(rayleigh=(0.1, 0.01)), nu=0.3, finite=True)
@@ -280,6 +285,7 @@ def test_taylor_with_finite_strain(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_restored_state_goes_on_alike(comm: MPI.Intracomm) -> None:
     effect = with_velocity(fx.Inertia(rayleigh=(0.1, 0.0)))

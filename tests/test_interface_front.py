@@ -166,6 +166,7 @@ def same(a: Tips, b: Tips) -> bool:
     )
 
 
+@pytest.mark.quick("interval")
 @pytest.mark.parametrize("kind", ["interval", "triangle", "quadrilateral"])
 @settings(max_examples=25)
 @given(choice=st.lists(st.integers(0, 10**6), min_size=1, max_size=12))

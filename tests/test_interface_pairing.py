@@ -149,6 +149,7 @@ def test_bonded_node_outside_the_master(comm: MPI.Intracomm) -> None:
     assert pair.paired.all()
 
 
+@pytest.mark.three
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     "supports",

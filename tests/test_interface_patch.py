@@ -88,6 +88,7 @@ def tie(**options: object) -> fx.Interface:
     )
 
 
+@pytest.mark.quick("*-1-*")
 @pytest.mark.parametrize(
     ("cell", "order", "load"),
     [

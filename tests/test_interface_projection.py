@@ -47,6 +47,7 @@ def test_nodes_of_the_surface_have_one_master(kind: str, order: int, warp: objec
     assert np.all(found.distance == 0.0)
 
 
+@pytest.mark.quick("interval-*", "quadrilateral-1")
 @pytest.mark.parametrize(("kind", "order"), KINDS)
 @settings(max_examples=30)
 @given(points=arrays(np.float64, (20, 3), elements=st.floats(-0.4, 2.4)))
@@ -65,6 +66,7 @@ def test_plane_surface(kind: str, order: int, points: Array) -> None:
     assert found.normal == pytest.approx(np.tile([0.0, 1.0, 0.0], (20, 1)), abs=ROUND_OFF)
 
 
+@pytest.mark.quick("interval-*", "quadrilateral-1")
 @pytest.mark.parametrize(("kind", "order"), KINDS)
 def test_curved_surface(kind: str, order: int) -> None:
     """No sample of the surface is closer than the foot."""

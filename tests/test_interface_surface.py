@@ -54,6 +54,7 @@ def continuum(mesh: Mesh, order: int | None = None) -> Continuum:
     return Continuum(mesh, fx.Isotropic(1.0, 0.3), model, order=order)
 
 
+@pytest.mark.three
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), CASES)
 def test_gathered_surface(comm: MPI.Intracomm, cell: str, order: int) -> None:

@@ -55,6 +55,7 @@ def test_first_order_tips_are_units_of_their_own():
     scene.close()
 
 
+@pytest.mark.slow
 def test_wide_second_order_front_softens_edge_by_edge():
     # Elements longer than an arm is thick: let go one by one, rows carried up to twice the load,
     # as G of the row at the free edge is negative.

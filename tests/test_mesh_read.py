@@ -161,6 +161,8 @@ def check_box(mesh: Mesh, cell: str, order: int) -> None:
     assert_same_on_ghosts(mesh)
 
 
+@pytest.mark.quick("*-1")
+@pytest.mark.three
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), CASES)
 def test_model(comm: MPI.Comm, cell: str, order: int) -> None:

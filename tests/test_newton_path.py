@@ -33,6 +33,9 @@ STATIC: dict[str, dict[str, Any]] = {
 }
 
 
+@pytest.mark.smoke
+@pytest.mark.three
+@pytest.mark.quick("event", "increment")
 @pytest.mark.parametrize(
     "stepping", [pytest.param("event", marks=pytest.mark.mpi), "increment", "path"]
 )
@@ -123,6 +126,7 @@ def test_a_load_beyond_reach_ends_the_step_with_the_reason(comm: MPI.Intracomm) 
         )
 
 
+@pytest.mark.quick("1.0-False")
 @pytest.mark.parametrize("finite", [False, True])
 @pytest.mark.parametrize("first", [1.0, -1.0])
 def test_unloading_to_nothing_and_loading_the_other_way(finite: bool, first: float) -> None:

@@ -41,6 +41,7 @@ def peel(comm: MPI.Intracomm, *, reuse: bool, **options: Any) -> fx.Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_same_history_with_fewer_tangents(comm: MPI.Intracomm) -> None:
     scenes = [peel(comm, reuse=reuse) for reuse in (True, False)]
@@ -56,6 +57,7 @@ def test_same_history_with_fewer_tangents(comm: MPI.Intracomm) -> None:
     assert made[0] < 0.8 * made[1], made
 
 
+@pytest.mark.quick("event-release0", "path-release2")
 @pytest.mark.parametrize(
     ("stepping", "release"),
     [
@@ -143,6 +145,7 @@ def test_a_tangent_that_cannot_be_factored_leaves_a_model_that_can_go_on(
     scene.close()
 
 
+@pytest.mark.quick("False-schur")
 @pytest.mark.mpi
 @pytest.mark.parametrize("method", ["schur", "columns"])
 @pytest.mark.parametrize("bordered", [True, False])
@@ -233,6 +236,7 @@ def closing(balance: float = 1e-5, **step: Any) -> fx.History:
     return scene.run(fx.Static(until=fx.Time(3.0), **step))
 
 
+@pytest.mark.quick("increments")
 @pytest.mark.parametrize(
     "step",
     [

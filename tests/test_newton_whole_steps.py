@@ -35,6 +35,7 @@ def inflated(maximum: float) -> tuple[fx.Scene, Row]:
     return scene, onsets(history)[0]
 
 
+@pytest.mark.slow
 def test_follower_pressure_in_one_increment_or_in_many() -> None:
     """The first whole step alone knows of the new pressure; a failed trial leaves none behind."""
     (one, coarse), (_, fine) = inflated(1.0), inflated(0.05)
@@ -64,6 +65,7 @@ def test_no_equilibrium_between_here_and_beyond(monkeypatch: pytest.MonkeyPatch)
     assert onsets(history)[0]["f[bond]"] == pytest.approx(1.0, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_turn_without_stress_is_not_divided() -> None:
     """What rounding leaves of its energies does not add up, and need not."""
     clock = np.linspace(0.0, 1.0, 41)

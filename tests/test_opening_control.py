@@ -84,6 +84,7 @@ def test_the_mouth_opens_steadily_while_the_load_falls(comm: MPI.Intracomm) -> N
     assert largest_imbalance(history) < 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_linear_bodies_on_the_nonlinear_path_open_alike(comm: MPI.Intracomm) -> None:
     one, other = (
@@ -93,6 +94,7 @@ def test_linear_bodies_on_the_nonlinear_path_open_alike(comm: MPI.Intracomm) -> 
     assert_same(one, other, 1e-8, R=1e-8)  # the forces hold each other: no reaction
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_arms_that_turn_far_open_steadily_too(comm: MPI.Intracomm) -> None:
     """A tough bond: the ends turn by some 20 degrees before the first node lets go."""

@@ -105,6 +105,7 @@ def read_bodies(pvd: Path) -> list[tuple[float, list[dict[str, Any]]]]:
 # -- what the fields hold --------------------------------------------------------------------------
 
 
+@pytest.mark.quick("2d", "3d")
 @pytest.mark.mpi
 @pytest.mark.parametrize("kind", MESHES)
 def test_jumps_and_tractions_agree_with_the_window(kind: str) -> None:
@@ -269,6 +270,9 @@ def test_fields_need_a_state() -> None:
 # -- files -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.smoke
+@pytest.mark.three
+@pytest.mark.quick("2d", "3d")
 @pytest.mark.mpi
 @pytest.mark.parametrize("kind", ["2d", "2d quadratic", "3d", "3d quadratic"])
 def test_files_hold_the_fields(kind: str, comm: MPI.Comm, shared_path: Path) -> None:
@@ -313,6 +317,7 @@ def test_files_hold_the_fields(kind: str, comm: MPI.Comm, shared_path: Path) -> 
     scene.close()
 
 
+@pytest.mark.quick("model0")
 @pytest.mark.mpi
 @pytest.mark.parametrize("model", [fx.PlaneStress(), fx.PlaneStrain()])
 def test_uniform_tension_is_found_in_the_file(
@@ -385,6 +390,7 @@ def test_series_follows_a_run(shared_path: Path) -> None:
     scene.close()
 
 
+@pytest.mark.quick("write_grid")
 @pytest.mark.mpi
 @pytest.mark.parametrize("broken", ["write_grid", "write_series"])
 def test_a_failed_write_leaves_the_old_files(

@@ -31,6 +31,7 @@ def whole(comm: MPI.Intracomm, **options: object) -> fx.Scene:
     )
 
 
+@pytest.mark.quick("condensed")
 @pytest.mark.parametrize("path", ["condensed", "newton"])
 def test_held_bodies_are_pressed_as_they_warm(comm: MPI.Intracomm, path: str) -> None:
     sides = ("end_upper", "end_lower", "far_upper", "far_lower", "top", "bottom")
@@ -47,6 +48,7 @@ def test_held_bodies_are_pressed_as_they_warm(comm: MPI.Intracomm, path: str) ->
     assert stress == pytest.approx(np.tile(expected, (len(stress), 1)), abs=1e-9 * E * ALPHA * RISE)
 
 
+@pytest.mark.slow
 def test_turned_bodies_are_not_stressed(comm: MPI.Intracomm) -> None:
     # the two ends of the lower edge go where a turn by 60 degrees takes them
     turn = np.radians(60.0) * CLOCK

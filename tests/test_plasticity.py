@@ -76,6 +76,7 @@ def stress_of(strain: float, material: fx.Plastic) -> float:
     return s
 
 
+@pytest.mark.quick("ring-*")
 @pytest.mark.parametrize(
     "material",
     [METAL, fx.Plastic(E, NU, hardening=TABLE), fx.Plastic(E, NU, yield_stress=Y)],
@@ -105,6 +106,7 @@ def test_uniaxial(comm: MPI.Intracomm, model: str, material: fx.Plastic) -> None
     bodies.destroy()
 
 
+@pytest.mark.quick("plane strain-*", "ring-1", "solid-1")
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("model", ["plane strain", "ring", "solid"])
 def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:
@@ -160,6 +162,7 @@ def test_plane_strain_is_a_held_solid(comm: MPI.Intracomm) -> None:
     assert forces[0] == pytest.approx(forces[1], rel=1e-8)  # Newton stops at 1e-11
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_energy_balance_is_exact(comm: MPI.Intracomm) -> None:
     """Work of the ends by the trapezoidal rule = elastic energy + plastic work, cycle included."""
@@ -203,6 +206,7 @@ def test_clamped_bar_is_cooled_beyond_yield(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_beside_elastic_cells_and_restored(comm: MPI.Intracomm) -> None:
     mesh = box(comm, "plane strain")

@@ -182,6 +182,7 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
 
 
+@pytest.mark.quick("hexahedron-1")
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), [("hexahedron", 1), ("hexahedron", 2)])
 def test_release_map_has_the_crack_area_of_the_history(cell: str, order: int) -> None:
@@ -247,6 +248,7 @@ def test_shape_of_a_plane_body_is_its_cells(comm: MPI.Comm, order: int) -> None:
     scene.close()
 
 
+@pytest.mark.quick("hexahedron-1")
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), [("tetrahedron", 1), ("hexahedron", 1)])
 def test_shape_of_a_solid_is_its_skin(comm: MPI.Comm, cell: str, order: int) -> None:
@@ -298,6 +300,7 @@ def test_view_axes_are_a_frame_with_up_upright(azimuth: float, elevation: float)
 # -- files -----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_pictures_come_out_on_all_ranks(comm: MPI.Comm, shared_path: Path) -> None:
     flat, thick = plane(), solid()

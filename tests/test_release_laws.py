@@ -75,6 +75,7 @@ def test_second_order_units_spend_the_toughness_of_their_area(element):
     scene.close()
 
 
+@pytest.mark.slow
 def test_saw_tooth_is_at_least_five_times_smaller_than_that_of_step_release():
     amplitude = {}
     for name, release in (("step", fx.StepRelease()), ("progressive", fx.ProgressiveRelease())):
@@ -220,6 +221,7 @@ def test_viscosity_spends_energy_and_fades_with_small_increments():
     assert 0.0 < spent[1e-3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["enhanced", "progressive"])
 def test_viscosity_of_softening_bonds_fades_with_mu_and_the_increment(kind):
     propagation = 0.15 if kind == "enhanced" else TOUGHNESS

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import subprocess
 import tomllib
 from pathlib import Path
@@ -17,6 +18,7 @@ ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 
 
+@pytest.mark.smoke
 def test_every_subpackage_is_installed() -> None:
     top = Path(fxcrack.__file__).parent
     found = {
@@ -46,6 +48,29 @@ def test_version_is_the_same_everywhere() -> None:
     assert installed == fxcrack.__version__ == PROJECT["project"]["version"]
 
 
+def run_on_two_ranks(
+    folder: Path, test: str, **environment: str
+) -> subprocess.CompletedProcess[str]:
+    """A file of tests on two ranks, with the settings of these tests but for less patience."""
+    conftest = (ROOT / "tests" / "conftest.py").read_text()
+    hasty = conftest.replace("PATIENCE = 30.0", "PATIENCE = 0.5")
+    assert hasty != conftest
+    (folder / "conftest.py").write_text(hasty)
+    (folder / "test_one.py").write_text(test)
+    return subprocess.run(
+        [
+            ROOT / ".ci" / "mpirun",
+            *"-n 2 python3 -m pytest --color=no -p no:cacheprovider".split(),
+            folder,
+        ],
+        env={**os.environ, "FXCRACK_TESTS_RUNNING": str(folder), **environment},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("after", "message"),
@@ -57,23 +82,33 @@ def test_version_is_the_same_everywhere() -> None:
 def test_failure_on_one_rank_ends_and_fails_the_run(
     tmp_path: Path, after: str, message: str
 ) -> None:
-    conftest = (ROOT / "tests" / "conftest.py").read_text()
-    hasty = conftest.replace("PATIENCE = 30.0", "PATIENCE = 0.5")
-    assert hasty != conftest
-    (tmp_path / "conftest.py").write_text(hasty)
     lines = ["if comm.rank == 1:", "    raise ValueError('it broke')", after]
-    (tmp_path / "test_one.py").write_text("\n    ".join(["def test(comm):", *lines]))
-    run = subprocess.run(
-        [
-            ROOT / ".ci" / "mpirun",
-            *"-n 2 python3 -m pytest --color=no -p no:cacheprovider".split(),
-            tmp_path,
-        ],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        check=False,
-    )
+    run = run_on_two_ranks(tmp_path, "\n    ".join(["def test(comm):", *lines]))
     assert run.returncode != 0
     assert message in run.stdout + run.stderr
     assert "ValueError: it broke" in run.stdout + run.stderr
+
+
+# A call that never returns and keeps the interpreter lock, as calls of PETSc do: time.sleep of
+# ctypes.PyDLL. A timer in Python would not end it.
+HANGING = """
+import ctypes, pytest
+def test_that_fails(comm):
+    assert comm.rank < 0
+@pytest.mark.parametrize("what", ["a call"])
+def test_that_hangs(comm, what):
+    if comm.rank == 1:
+        ctypes.PyDLL(None).sleep(100)
+    comm.Barrier()
+"""
+
+
+@pytest.mark.slow
+def test_a_test_past_its_limit_is_named_and_ends_all_ranks(tmp_path: Path) -> None:
+    # the limit of a quick test is so 1.2 s, some more on a busy machine
+    run = run_on_two_ranks(tmp_path, HANGING, FXCRACK_TEST_PATIENCE="0.01")
+    assert run.returncode != 0
+    assert "FAILED test_one.py::test_that_fails - " in run.stdout  # though no summary was reached
+    notes = [path.read_text() for path in tmp_path.glob("rank*")]
+    assert all(note.startswith("test_one.py::test_that_hangs[a call] - ") for note in notes)
+    assert any("in test_that_hangs" in note for note in notes)

@@ -30,6 +30,7 @@ CRITERIA = {
 }
 
 
+@pytest.mark.quick("*-1")
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", CRITERIA)
@@ -95,6 +96,7 @@ def test_bonds_in_the_normal_direction_only(name: str) -> None:
 # --- one after the other, and not at all ----------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_steps_in_sequence_and_pairs_that_stay_tied() -> None:
     scene = two_cracks.make_scene(dx=1.0, n_upper=4)
@@ -196,6 +198,7 @@ def test_force_follows_the_amplitude_through_steps() -> None:
     assert history["released_energy"][-1] > 0.0
 
 
+@pytest.mark.quick("None")
 @pytest.mark.mpi
 @pytest.mark.parametrize("rows", [None, 0.1])
 def test_release_in_progress_survives_steps_and_new_windows(rows: float | None) -> None:

@@ -45,6 +45,7 @@ CARBON = fx.Orthotropic(
 # -- numbers of other programs ---------------------------------------------------------------------
 
 
+@pytest.mark.quick("0.5-4-curve0")
 @pytest.mark.parametrize(
     ("dx", "ny", "curve"),
     [
@@ -67,6 +68,7 @@ def test_bench_dcb(dx: float, ny: int, curve: dict[int, tuple[float, float]]) ->
     scene.close()
 
 
+@pytest.mark.slow
 def test_bench_dcb_3d() -> None:
     """Onset in the middle of the width, at the load of docs/reference-values.md."""
     scene = dcb3(MPI.COMM_SELF)
@@ -188,6 +190,9 @@ RUNS: dict[str, tuple[Callable[..., fx.Scene], fx.Static]] = {
 }
 
 
+@pytest.mark.smoke
+@pytest.mark.three
+@pytest.mark.quick("DCB", "contact", "increments")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", RUNS)
 def test_any_number_of_ranks(comm: MPI.Intracomm, name: str) -> None:
@@ -204,6 +209,7 @@ def test_any_number_of_ranks(comm: MPI.Intracomm, name: str) -> None:
     assert len(set(comm.allgather(str(found.rows)))) == 1
 
 
+@pytest.mark.quick("options0-DCB", "options1-contact", "options1-increments")
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("options", [{"rows": 0.0}, {"method": "columns"}])
 def test_any_window(name: str, options: dict[str, object]) -> None:
@@ -340,6 +346,7 @@ def test_refactoring_at_each_release(nx_lower: int | None) -> None:
 # -- increments ------------------------------------------------------------------------------------
 
 
+@pytest.mark.quick("0.3-0.2")
 @pytest.mark.parametrize("tolerance", [0.05, 0.2])
 @pytest.mark.parametrize("initial", [0.3, 0.02])
 def test_increments_stay_within_the_tolerance(tolerance: float, initial: float) -> None:

@@ -53,6 +53,7 @@ def test_toughness_follows_the_temperature_on_the_nonlinear_path(comm: MPI.Intra
     assert b == pytest.approx(a, rel=1e-8)
 
 
+@pytest.mark.quick("None")
 @pytest.mark.parametrize("path", [None, "newton"])
 def test_a_steady_temperature_loads_the_bodies_at_once(path: str | None) -> None:
     steel, other = (fx.Isotropic(200e3, 0.3, expansion=a) for a in (1e-5, 2e-5))

@@ -71,6 +71,7 @@ def made(continuum: Continuum, kind: str) -> WeakForm:
     return WeakForm(continuum, [Elastic(continuum, finite=kind == "finite")])
 
 
+@pytest.mark.quick("plane stress-*", "ring-neo")
 @pytest.mark.parametrize(
     ("model", "kind"), [(m, k) for m in HELD for k in KINDS if (m, k) != ("plane stress", "neo")]
 )
@@ -92,6 +93,7 @@ def test_free_expansion_is_free_of_stress(comm: MPI.Intracomm, model: str, kind:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane stress")
 @pytest.mark.parametrize("model", ["plane stress", "solid"])
 def test_a_linear_temperature_is_free_of_stress_in_second_order_bodies(
     comm: MPI.Intracomm, model: str
@@ -158,6 +160,7 @@ def test_plane_strain_out_of_plane(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("plane stress")
 @pytest.mark.parametrize("model", MODELS)
 def test_loads_of_the_linear_path(comm: MPI.Intracomm, model: str) -> None:
     """The same forces and energies as the term, pattern by pattern, for a tilted material."""
@@ -193,6 +196,7 @@ def test_loads_of_the_linear_path(comm: MPI.Intracomm, model: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.quick("linear", "neo")
 @pytest.mark.parametrize("kind", KINDS)
 def test_taylor(comm: MPI.Intracomm, kind: str) -> None:
     material = fx.NeoHookean(E, NU, expansion=0.1) if kind == "neo" else CARBON
@@ -214,6 +218,7 @@ def test_taylor(comm: MPI.Intracomm, kind: str) -> None:
         bodies.destroy()
 
 
+@pytest.mark.quick("linear")
 @pytest.mark.mpi
 @pytest.mark.verification
 @pytest.mark.parametrize("path", ["linear", "finite"])
@@ -253,6 +258,7 @@ def test_bilayer_curvature(comm: MPI.Intracomm, path: str) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 def test_moduli_by_temperature(comm: MPI.Intracomm) -> None:
     """A bar whose modulus varies along it with the temperature: E = 100 + 50 x, nu = 0."""
     table = fx.ByTemperature(
@@ -284,6 +290,7 @@ def test_moduli_by_temperature(comm: MPI.Intracomm) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_moduli_that_change_in_time(comm: MPI.Intracomm) -> None:
     """A clamped bar heated while it softens: stress E(T) A T, energies balance."""

@@ -55,6 +55,7 @@ def grown(kind: str, toughness: Any, temperature: Any = None) -> fx.Scene:
     return scene
 
 
+@pytest.mark.quick("vcct")
 @pytest.mark.parametrize("kind", ["vcct", "enhanced", "fatigue"])
 def test_three_ways_to_say_the_same(kind: str) -> None:
     """A function of position, a value per slave node, a table against a field of temperature."""

@@ -33,6 +33,7 @@ IM7_BEAM = CorrectedBeam(E=161.0e3, E22=11.38e3, G=5.2e3, h=2.25, b=25.4)
 # -- double cantilever beam ------------------------------------------------------------------------
 
 
+@pytest.mark.quick("*-0.5-2")
 @pytest.mark.parametrize(
     ("cell", "order", "dx", "ny"),
     [("quadrilateral", 1, 0.25, 8), ("quadrilateral", 2, 0.5, 2), ("triangle", 2, 0.5, 3)],
@@ -141,6 +142,7 @@ def test_energy_release_over_the_width() -> None:
 # -- bending ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.quick("2-0.25-4-35.0")
 @pytest.mark.parametrize("a", [35.0, 40.0])
 @pytest.mark.parametrize(("order", "dx", "ny"), [(1, 0.125, 16), (2, 0.25, 4)])
 def test_end_notched_flexure(a: float, order: int, dx: float, ny: int) -> None:
@@ -178,6 +180,7 @@ def test_end_notched_flexure(a: float, order: int, dx: float, ny: int) -> None:
     scene.close()
 
 
+@pytest.mark.quick("2-0.5-3-*")
 @pytest.mark.parametrize("lever", [30.0, 42.0, 80.0])
 @pytest.mark.parametrize(("order", "dx", "ny"), [(1, 0.25, 8), (2, 0.5, 3)])
 def test_mixed_mode_bending(lever: float, order: int, dx: float, ny: int) -> None:
@@ -221,6 +224,7 @@ def test_mixed_mode_bending(lever: float, order: int, dx: float, ny: int) -> Non
 # -- plates and rings ------------------------------------------------------------------------------
 
 
+@pytest.mark.quick("1-*")
 @pytest.mark.parametrize("method", ["vcct", "closure"])
 @pytest.mark.parametrize(("order", "dr"), [(1, 0.05), (2, 0.05)])
 def test_penny_shaped_crack(order: int, dr: float, method: str) -> None:
@@ -257,6 +261,7 @@ def test_penny_shaped_crack(order: int, dr: float, method: str) -> None:
     scene.close()
 
 
+@pytest.mark.quick("*-quadrilateral-1-*")
 @pytest.mark.parametrize("method", ["vcct", "closure"])
 @pytest.mark.parametrize(("cell", "order"), [("quadrilateral", 1), ("triangle", 2)])
 @pytest.mark.parametrize("model", [fx.PlaneStrain(), fx.PlaneStress()])

@@ -34,11 +34,21 @@ class Interrupted(KeyboardInterrupt):
         self.code = 128 + signum
 
 
+_NOBODYS = {
+    # gmsh.initialize() puts SIG_DFL, which ends the process on the spot, in the place of Python's
+    signal.SIGINT: (signal.default_int_handler, signal.SIG_DFL),
+    signal.SIGTERM: (signal.SIG_DFL,),
+}
+"""Dispositions by which a signal ends the process: no program has asked for another answer."""
+
+
 class Listener:
     """Context manager that notes SIGINT and SIGTERM instead of letting them end the process.
 
-    It does nothing outside the main thread, and leaves handlers alone that a program has set.
-    A second signal ends the process at once.
+    It takes a signal whose disposition is the default of the system or that of Python, and puts
+    that back at the end. A handler that a program has set stays in charge of its signal, and a
+    signal that is ignored remains so. Outside the main thread it does nothing. A second signal
+    ends the process at once.
 
     Args:
         patience: Seconds the program has to stop by itself.
@@ -59,9 +69,8 @@ class Listener:
         """Begin to listen."""
         if threading.current_thread() is not threading.main_thread():
             return self
-        usual = {signal.SIGINT: signal.default_int_handler, signal.SIGTERM: signal.SIG_DFL}
-        for number, handler in usual.items():
-            if signal.getsignal(number) == handler:
+        for number, dispositions in _NOBODYS.items():
+            if signal.getsignal(number) in dispositions:
                 self._before[number] = signal.signal(number, self._note)
         if self._before:
             self._ends = socket.socketpair()

@@ -18,6 +18,9 @@ from fxcrack.base.arrays import Array, Ints
 
 _BLOCK = 64
 
+_SMALL = 1e8
+"""Pivots beyond this multiple of the round-off of their own diagonal entry are no round-off."""
+
 
 class NotPositiveDefinite(ArithmeticError):
     """A pivot vanished: the unknown ``index`` is not restrained by anything.
@@ -39,8 +42,9 @@ class GrowingCholesky:
         floor: A pivot below ``floor`` times the diagonal of S counts as zero.
 
     Attributes:
-        round_off: Round-off of the entries of S; a pivot below it counts as zero as well. A number
-            or one per unknown, shape (n,).
+        round_off: Round-off e of the entries of S, a number or one per unknown, shape (n,). A pivot
+            is the energy v^t S v of the motion v of all free unknowns that it leaves least
+            restrained, with v = 1 at its own; below sum e_i v_i^2 it counts as zero as well.
     """
 
     def __init__(self, matrix: Array, *, floor: float = 1e-10) -> None:
@@ -176,14 +180,29 @@ class GrowingCholesky:
             NotPositiveDefinite: One of the unknowns is restrained by nothing.
         """
         tile, info = lapack.dpotrf(star, lower=1, clean=1)
-        scale = self._matrix[extra, extra]
-        least = np.broadcast_to(self.round_off, len(self._matrix))[extra]
-        bad = np.diagonal(tile) ** 2 <= np.maximum(self._floor * scale, least)
         if info > 0:
             raise NotPositiveDefinite(int(extra[info - 1]))
+        pivots = np.diagonal(tile) ** 2
+        round_off = np.broadcast_to(self.round_off, len(self._matrix))
+        bad = pivots <= np.maximum(self._floor * self._matrix[extra, extra], round_off[extra])
+        for j in np.flatnonzero(~bad & (pivots <= _SMALL * round_off[extra])):
+            bad[j] = pivots[j] <= self._round_off_of_pivot(tile, extra, int(j))
         if np.any(bad):
             raise NotPositiveDefinite(int(extra[np.argmax(bad)]))
         return np.asarray(tile)
+
+    def _round_off_of_pivot(self, tile: Array, extra: Ints, j: int) -> float:
+        """Round-off of the pivot of one of the unknowns of a factor of S*.
+
+        A body that is free but for round-off turns about a far support: the few unknowns with long
+        levers then carry the error, not the pivot's own diagonal entry.
+        """
+        unit = np.zeros((len(extra), 1))
+        unit[j] = tile[j, j]
+        own = lapack.dtrtrs(tile, unit, lower=1, trans=1)[0].ravel()
+        others = self.solve(self._matrix[np.ix_(self.free, extra)] @ own)
+        round_off = np.broadcast_to(self.round_off, len(self._matrix))
+        return float(round_off[extra] @ own**2 + round_off[self.free] @ others**2)
 
     def remove(self, gone: Ints) -> int:
         """Hold unknowns again.

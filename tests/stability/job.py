@@ -8,6 +8,8 @@ A short beam that lets go along many increments. Each rank says in ``pid-RANK`` 
     pause=S    every row lasts so many seconds
     block=N    row N is a computation of a minute that does not look at signals, on rank 0
     room=N     no file of rank 0 may become longer than N bytes: the disk is full
+    gmsh       gmsh.initialize() was called on rank 0, as by a script that makes its mesh there
+    own        the script has a handler of its own for SIGINT, which prints
 """
 
 from __future__ import annotations
@@ -15,9 +17,12 @@ from __future__ import annotations
 import ctypes
 import os
 import resource
+import signal
 import sys
 import time
 from pathlib import Path
+
+import gmsh
 
 import fxcrack as fx
 from fxcrack.meshes.dcb import dcb_2d
@@ -63,6 +68,10 @@ def main(folder: Path, words: dict[str, str]) -> None:
         if rows == 1 and "room" in words and COMM.rank == 0:
             resource.setrlimit(resource.RLIMIT_FSIZE, (int(words["room"]),) * 2)
 
+    if "gmsh" in words and COMM.rank == 0:
+        gmsh.initialize()
+    if "own" in words:
+        signal.signal(signal.SIGINT, lambda number, frame: print("own handler", flush=True))
     folder.joinpath(f"pid-{COMM.rank}").write_text(str(os.getpid()))
     history = scene.run(
         fx.Static(

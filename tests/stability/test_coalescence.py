@@ -47,6 +47,7 @@ def island(
     )
 
 
+@pytest.mark.quick("1-softening", "2-at once")
 @pytest.mark.mpi
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("order", [1, 2])

@@ -216,6 +216,7 @@ def enumerate_closed(system: ContactSystem) -> Array:
     return best
 
 
+@pytest.mark.slow
 @settings(max_examples=25, phases=(Phase.explicit, Phase.generate))
 @given(st.integers(0, 10**6))
 def test_chattering_set_is_found(seed: int) -> None:

@@ -164,6 +164,45 @@ def test_all_ranks_end_and_a_restart_continues(
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("ranks", "rank"),
+    [
+        pytest.param(1, 0, id="one rank"),
+        pytest.param(2, 0, id="the rank that made the mesh"),
+        pytest.param(2, None, id="the launcher"),
+    ],
+)
+def test_ctrl_c_saves_a_run_whose_script_called_gmsh(
+    ranks: int, rank: int | None, tmp_path: Path, undisturbed: list[dict[str, str]]
+) -> None:
+    """gmsh.initialize() makes SIGINT end the process at once; the run takes it over."""
+    job = Job(tmp_path, ranks, "pause=0.05", "gmsh")
+    job.wait_for_rows()
+    job.signal(signal.SIGINT, rank)
+    code, out = job.finish(LIMIT)
+    assert out.count("fxcrack: stopped by SIGINT; history in") == 1
+    if rank is not None:
+        assert code == 130
+    assert 12 <= len(rows_of(tmp_path / "history.csv")) < len(undisturbed)
+    if ranks == 1:
+        assert_continues(tmp_path, undisturbed)
+
+
+@pytest.mark.slow
+def test_a_handler_of_the_script_stays_in_charge(
+    tmp_path: Path, undisturbed: list[dict[str, str]]
+) -> None:
+    """It is called, and the run goes on: what Ctrl-C means is for the script to say."""
+    job = Job(tmp_path, 1, "pause=0.05", "gmsh", "own")
+    job.wait_for_rows()
+    job.signal(signal.SIGINT, 0)
+    code, out = job.finish()
+    assert code == 0
+    assert out.count("own handler") == 1 and "stopped by" not in out
+    assert rows_of(tmp_path / "history.csv") == undisturbed
+
+
+@pytest.mark.slow
 def test_a_signal_inside_a_long_computation_ends_all_ranks(tmp_path: Path) -> None:
     """Rank 0 computes for a minute, rank 1 waits for it: neither looks at signals."""
     job = Job(tmp_path, 2, "pause=0.05", "block=14")
@@ -421,6 +460,39 @@ def test_a_listener_leaves_the_handlers_of_a_program_and_other_threads_alone() -
     thread.start()
     thread.join(10.0)
     assert seen == [signal.default_int_handler]
+
+
+@pytest.mark.parametrize(
+    ("number", "disposition"),
+    [
+        (signal.SIGINT, signal.default_int_handler),
+        (signal.SIGINT, signal.SIG_DFL),
+        (signal.SIGTERM, signal.SIG_DFL),
+    ],
+    ids=["SIGINT of Python", "SIGINT of the system, as gmsh leaves it", "SIGTERM"],
+)
+def test_a_listener_takes_a_default_disposition_and_puts_it_back(
+    number: signal.Signals, disposition: signal.Handlers
+) -> None:
+    before = signal.signal(number, disposition)
+    try:
+        with Listener() as listener:
+            os.kill(os.getpid(), number)
+            assert listener.signum == number
+        assert signal.getsignal(number) == disposition
+    finally:
+        signal.signal(number, before)
+
+
+def test_a_listener_leaves_a_signal_alone_that_is_ignored() -> None:
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with Listener() as listener:
+            os.kill(os.getpid(), signal.SIGINT)
+            assert listener.signum == 0
+            assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 @pytest.mark.mpi

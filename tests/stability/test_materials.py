@@ -36,6 +36,7 @@ MATERIALS = {
 }
 
 
+@pytest.mark.quick("*-heights0-*")
 @pytest.mark.parametrize("contact", [False, True])
 @pytest.mark.parametrize("heights", [(1.5, 1.5), (1.5, 0.03)])
 @pytest.mark.parametrize("name", MATERIALS)

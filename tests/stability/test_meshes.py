@@ -165,6 +165,7 @@ def poor_tetrahedra(comm: MPI.Intracomm) -> fx.Mesh:
     return mesh
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_poor_tetrahedra(comm: MPI.Intracomm) -> None:
     histories = []

@@ -48,6 +48,7 @@ def onset_time(angle: float, law: str) -> float:
     return float(next(r for r in history if r["event"] == "onset")["time"])
 
 
+@pytest.mark.quick("0.0-*", "45.0-*", "90.0-*", "135.0-*")
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("angle", [0.0, 1e-6, 45.0, 89.0, 90.0 - 1e-6, 90.0, 135.0])
 def test_onset_at_any_mix(law: str, angle: float) -> None:
@@ -68,6 +69,7 @@ def test_onset_at_any_mix(law: str, angle: float) -> None:
         assert first["GII[bond]"] == pytest.approx(0.6, rel=1e-6)
 
 
+@pytest.mark.quick("*-event")
 @pytest.mark.parametrize("stepping", ["event", "increment"])
 @pytest.mark.parametrize("law", LAWS)
 def test_through_no_load_at_all(law: str, stepping: str) -> None:
@@ -107,6 +109,7 @@ def test_through_no_load_at_all(law: str, stepping: str) -> None:
     assert at_one - 1e-6 <= onset["time"] <= 2.0 + np.sqrt(1.2) + 1e-6
 
 
+@pytest.mark.quick("*-heights0")
 @pytest.mark.parametrize("heights", [(0.3, 3.0), (3.0, 0.3)])
 @pytest.mark.parametrize("law", LAWS)
 def test_products_of_the_wrong_sign(law: str, heights: tuple[float, float]) -> None:

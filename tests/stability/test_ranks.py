@@ -19,7 +19,7 @@ from fxcrack.meshes.dcb import dcb_3d
 from fxcrack.output.fields import write_fields
 from stability.beams import SELF, arms
 
-pytestmark = [pytest.mark.stability, pytest.mark.mpi]
+pytestmark = [pytest.mark.stability, pytest.mark.mpi, pytest.mark.three]
 
 UNEVEN = (0.0, 1.5, 4.0, 6.0, 8.0)
 """Across the width: of two nodes that are alike round-off would choose which goes first."""
@@ -33,6 +33,7 @@ def owners(scene: fx.Scene) -> npt.NDArray[np.int64]:
     return np.searchsorted(first, scene.pairs[0].surface.dofs, side="right") - 1
 
 
+@pytest.mark.quick("release0")
 @pytest.mark.parametrize("release", [fx.StepRelease(), fx.ProgressiveRelease()])
 def test_front_crosses_borders(
     comm: MPI.Intracomm, release: fx.StepRelease | fx.ProgressiveRelease

@@ -284,11 +284,11 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
 QUICK = (
     "increments",
     "progressive",
-    "finite strain, increments, friction",
+    "nonlinear path, progressive",
     "fatigue in two steps",
     "3-D",
 )
-"""The others take a second or two each on a busy machine."""
+"""The others take longer."""
 
 
 def run(
@@ -385,6 +385,8 @@ def test_restart_on_another_number_of_ranks(
             assert_same_history(whole, run(name, MPI.COMM_SELF, shared, restart=True))
 
 
+@pytest.mark.smoke
+@pytest.mark.three
 def test_tips_released_and_tables_are_restored(comm: MPI.Intracomm, shared_path: Path) -> None:
     """What is not in the rows: records of releases and the table of fatigue."""
     checkpoint = fx.Checkpoint(shared_path / "state.npz", every=1)
@@ -449,6 +451,7 @@ OTHERS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], fx.Static, str]] = 
 }
 
 
+@pytest.mark.quick("material")
 @pytest.mark.parametrize(
     "what",
     [
@@ -493,6 +496,7 @@ def test_functions_that_give_something_else_are_found_by_the_equilibrium(
     other.close()
 
 
+@pytest.mark.slow
 def test_nonlinear_bodies_need_their_cells_in_the_same_order(
     comm: MPI.Intracomm, shared_path: Path
 ) -> None:
@@ -538,6 +542,7 @@ def test_without_a_checkpoint_a_restart_begins_and_rubbish_is_refused(
         fx.Checkpoint("state.npz", seconds=-1.0)
 
 
+@pytest.mark.slow
 def test_files_of_another_run_are_not_mixed_in(comm: MPI.Intracomm, shared_path: Path) -> None:
     """Stopped in its first step, a run must not go on with a second step of an older one."""
     make, steps = RUNS["fatigue in two steps"]

@@ -72,6 +72,7 @@ def test_tolerance_that_needs_more_cutbacks_than_allowed() -> None:
 # -- increments ------------------------------------------------------------------------------------
 
 
+@pytest.mark.quick("True-*")
 @pytest.mark.parametrize("factor", [1e-9, 1e-3, 1e3, 1e9])
 @pytest.mark.parametrize("contact", [False, True])
 def test_first_increment_far_off(factor: float, contact: bool) -> None:
@@ -135,6 +136,7 @@ def test_jump_of_the_load(width: float) -> None:
     assert end["released_energy"] == pytest.approx(other["released_energy"], rel=1e-6)
 
 
+@pytest.mark.quick("*-event", "1.0-increment")
 @pytest.mark.parametrize("stepping", ["event", "increment"])
 @pytest.mark.parametrize("turn", [0.9, 1.0, 1.1])
 def test_load_turns_before_at_and_after_release(turn: float, stepping: str) -> None:

@@ -163,6 +163,7 @@ def history_of(problem: str, m: float, n: float) -> fx.History:
     return history
 
 
+@pytest.mark.quick("*-SI", "*-powers of two", "*-um, N")
 @pytest.mark.parametrize("system", SYSTEMS)
 @pytest.mark.parametrize("problem", PROBLEMS)
 def test_same_history(problem: str, system: str) -> None:
