@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol, Self
 
 from fxcrack.base.errors import FxcrackError, InputError
-from fxcrack.criteria import Fatigue, RateCriterion
 from fxcrack.history import History, Row
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles
@@ -171,7 +170,9 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
     analysis = scene.analysis
     ours, name, excess = _first(analysis.history, grow, cycles=cycles)
     order = analysis.continuum.order
-    degree = 2 if all(isinstance(d.criterion, RateCriterion) for d in grow) else 1
+    # of an unknown power the smallest is assumed: it makes the error of the load the largest
+    degree = min((d.criterion.degree or 1.0 for d in grow), default=1.0)
+    rates = all(d.criterion.knows_toughness for d in grow)
     try:
         twin = scene.rebuilt(order=3 - order)
         try:
@@ -188,11 +189,11 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
             "accuracy does so for any scene function. The run is kept in scene.history"
         ) from error
     scale = ((1.0 + other) / (1.0 + excess)) ** (1.0 / degree)  # both at f = 1
-    load, rate = _differences(ours, theirs, name, degree, scale, cycles=cycles)
+    load, rate = _differences(ours, theirs, name, 2 if rates else 1, scale, cycles=cycles)
     more = _MORE if order == 1 else 1.0
     life = None
     if cycles:
-        exponents = [abs(d.criterion.paris.c4) for d in grow if isinstance(d.criterion, Fatigue)]
+        exponents = [abs(d.criterion.life_exponent) for d in grow]
         life = (1.0 + more * rate) ** max(exponents, default=0.0) - 1.0
     return Estimate(
         load=more * load,

@@ -35,7 +35,7 @@ def bond(strength: float = 1.0, final: float = 1.0, largest: float | None = None
 
 def test_step_holds_in_its_increment_and_goes_in_the_next() -> None:
     assert StepRelease().remaining([0, 1, 2]).tolist() == [1.0, 0.0, 0.0]
-    assert StepRelease().driver == "increments"
+    assert StepRelease().driver == "once"
 
 
 def test_ramp_over_increments_or_opening() -> None:
@@ -106,8 +106,8 @@ def test_amplitude_release() -> None:
         (lambda: AmplitudeRelease([0, 1, 1], [1, 0.5, 0]), "times must increase"),
         (lambda: AmplitudeRelease([0, 1], [1, math.nan]), r"fractions\[1\] = nan"),
         (lambda: AmplitudeRelease([0, 1], [1, 0], 0.0), "first_increment = 0.0 must be positive"),
-        (lambda: RampRelease(0), "Ramp: increments = 0 must be a whole number, at least 1"),
-        (lambda: RampRelease(2.5), "Ramp: increments = 2.5 must be a whole number"),  # type: ignore[arg-type]
+        (lambda: RampRelease(0), "RampRelease: increments = 0 must be a whole number, at least 1"),
+        (lambda: RampRelease(2.5), "RampRelease: increments = 2.5 must be a whole number"),  # type: ignore[arg-type]
     ],
 )
 def test_bad_laws_are_refused_when_written(make: Any, says: str) -> None:

@@ -57,17 +57,21 @@ REFUSED: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
     ),
     "amplitude with VCCT": (
         lambda: fx.Debond(interface(), VCCT, fx.AmplitudeRelease((0.0, 1.0), (1.0, 0.0))),
-        ("interface 'bond'", "AmplitudeRelease is not possible with VCCT", "Step, Ramp or"),
+        (
+            "interface 'bond'",
+            "AmplitudeRelease is not possible with VCCT",
+            "RampRelease(increments=...) or Prog",
+        ),
     ),
     "progressive without toughness": (
         lambda: fx.Debond(interface(), STRESS, fx.ProgressiveRelease()),
-        ("Progressive is not possible with CriticalStress", "Step or AmplitudeRelease"),
+        ("ProgressiveRelease is not possible with CriticalStress", "StepRelease or Amplitude"),
     ),
     "ramp with crack length": (
         lambda: fx.Debond(
             interface(), fx.CrackLengthVsTime((0.0,), (1.0,), reference="top"), fx.RampRelease()
         ),
-        ("Ramp is not possible with CrackLengthVsTime",),
+        ("RampRelease is not possible with CrackLengthVsTime",),
     ),
     "amplitude that does not begin with 1": (
         lambda: fx.AmplitudeRelease((0.0, 1.0), (0.9, 0.0)),
@@ -83,7 +87,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], tuple[str, ...]]] = {
     ),
     "no criterion": (
         lambda: fx.Debond(interface(), 0.17),  # type: ignore[arg-type]
-        ("interface 'bond'", "float is not a criterion"),
+        ("interface 'bond'", "float is not a criterion", "derive yours from Criterion"),
     ),
     "self-contact": (
         lambda: fx.Interface("upper_face", "upper_face"),

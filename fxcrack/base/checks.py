@@ -50,6 +50,21 @@ def check_instance(
         raise InputError(f"{owner}: {name} is {_kind(value)}; give e.g. {example}")
 
 
+def missing_members(value: Any, protocol: type) -> str:
+    """What an object lacks of a protocol, in words; empty where nothing is missing.
+
+    Args:
+        value: What the user gave.
+        protocol: Class whose public members it must have.
+    """
+    if isinstance(value, type):
+        return f"it is a class; make one, {value.__name__}(...)"
+    names = sorted({*vars(protocol), *getattr(protocol, "__annotations__", {})})
+    lacking = [n for n in names if not n.startswith("_") and not hasattr(value, n)]
+    more = f" and {len(lacking) - 4} more" if len(lacking) > 4 else ""
+    return f"it lacks {', '.join(lacking[:4])}{more}" if lacking else ""
+
+
 def warn_of_same_titles(kind: str, parts: Iterable[Any]) -> None:
     """Warn of parts that the history would call the same."""
     titles = [part.title for part in parts]

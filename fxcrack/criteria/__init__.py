@@ -7,6 +7,7 @@ tangent); arrays have one row per front node.
 from fxcrack.criteria.crack_closure import closure_rates, energy_release_rates
 from fxcrack.criteria.crack_length_vs_time import CrackLengthVsTime
 from fxcrack.criteria.crack_opening import CrackOpening
+from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.critical_stress import CriticalStress
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.fatigue import CycleJump, Fatigue, Paris, Regime, cycle_jump
@@ -15,7 +16,7 @@ from fxcrack.criteria.release_laws import (
     AmplitudeRelease,
     ProgressiveRelease,
     RampRelease,
-    Release,
+    ReleaseLaw,
     StepRelease,
 )
 from fxcrack.criteria.toughness import Property, Tabulated
@@ -27,6 +28,7 @@ __all__ = [
     "AmplitudeRelease",
     "CrackLengthVsTime",
     "CrackOpening",
+    "Criterion",
     "CriticalStress",
     "CycleJump",
     "EnhancedVCCT",
@@ -40,7 +42,7 @@ __all__ = [
     "RateCriterion",
     "Reeder",
     "Regime",
-    "Release",
+    "ReleaseLaw",
     "StepRelease",
     "Tabulated",
     "clip",

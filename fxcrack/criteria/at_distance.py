@@ -12,10 +12,12 @@ so they are linear between two equilibria of the same states.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.criteria.evaluator import Evaluator
 from fxcrack.interface.surface_paths import SurfacePaths, Way, locate
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.linear import LinearSolver
@@ -51,7 +53,7 @@ class Stencil:
         return np.asarray(np.einsum("nk,nk...->n...", self.weights, values))
 
 
-class _AtDistance:
+class _AtDistance(Evaluator):
     """What both criteria share: ways along the surface and stencils kept for the present front.
 
     Args:
@@ -61,7 +63,7 @@ class _AtDistance:
         temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
     """
 
-    degree = 1
+    degree: ClassVar[float] = 1.0
 
     def __init__(
         self, solver: LinearSolver, p: int, distance: float, temperature: Array | None
@@ -106,10 +108,6 @@ class _AtDistance:
         x = np.where(np.abs(x) < 1e-9 * self.paths.longest, 0.0, x)
         place = ", ".join(f"{c:.6g}" for c in x)
         return f"interface '{self.solver.pairs[self.p].title}', tip at ({place})"
-
-    def breaks(self) -> tuple[float, ...]:
-        """What is measured does not depend on time as such."""
-        return ()
 
 
 def _on_face(way: Way, points: Array, distance: float, order: int) -> tuple[Ints, Array]:

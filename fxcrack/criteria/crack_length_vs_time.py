@@ -20,9 +20,12 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.checks import not_negative, table
 from fxcrack.base.errors import InputError
+from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.evaluator import Evaluator
+from fxcrack.criteria.release_laws import Driver
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.surface_paths import Origins, SurfacePaths
 from fxcrack.interface.tips import Tips
@@ -30,7 +33,7 @@ from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
-class CrackLengthVsTime:
+class CrackLengthVsTime(Criterion):
     """Growth that follows a curve of crack length against total time.
 
     Attributes:
@@ -49,8 +52,10 @@ class CrackLengthVsTime:
     moving: bool = field(default=False, kw_only=True)
     tolerance: float = field(default=0.1, kw_only=True)
 
+    degree: ClassVar[float] = 1.0
+    depends_on_load: ClassVar[bool] = False
     allows_normal_only: ClassVar[bool] = True
-    """Whether a bond in the normal direction only is possible."""
+    release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "time"))
 
     def __post_init__(self) -> None:
         """Check the curve."""
@@ -68,11 +73,6 @@ class CrackLengthVsTime:
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "lengths", lengths)
-
-    @property
-    def release_range(self) -> tuple[float, float]:
-        """Lower and upper limit of f at which a node may debond."""
-        return 1.0 - self.tolerance, 1.0 + self.tolerance
 
     def can_start(self, first_distance: npt.ArrayLike) -> Bools:
         """Whether the crack can ever start: not if the curve begins beyond the first bonded node.
@@ -165,7 +165,7 @@ def mean_position(solver: LinearSolver, where: str) -> Array:
     return np.asarray(total[:3] / total[3])
 
 
-class LengthEvaluator:
+class LengthEvaluator(Evaluator):
     """Growth along a curve of crack length against total time; collective.
 
     Args:
@@ -181,9 +181,7 @@ class LengthEvaluator:
         InputError: The reference nodes do not exist.
     """
 
-    degree = 1
-    ahead = 0.0
-    behind = 0.0
+    degree: ClassVar[float] = 1.0
 
     def __init__(self, solver: LinearSolver, p: int, criterion: CrackLengthVsTime) -> None:
         self.solver = solver
@@ -264,10 +262,6 @@ class LengthEvaluator:
         f = self.criterion.fraction(measured[:, 0], length, tips.d_behind)
         begun = measured[:, 1] > 1.0 - 1e-12  # between two states it is 1 up to round-off, or not
         return np.where(begun & self._moves[tips.node], f, 0.0), {"length": length}
-
-    def needs(self, tips: Tips) -> Ints:
-        """Nothing: neither forces nor openings count."""
-        return np.zeros(0, dtype=np.int64)
 
     def breaks(self) -> tuple[float, ...]:
         """Times at which the curve bends."""

@@ -20,6 +20,8 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import not_negative, positive, table
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.at_distance import Stencil, _AtDistance, _on_face
+from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.release_laws import Driver
 from fxcrack.criteria.toughness import Tabulated
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import Tips
@@ -27,7 +29,7 @@ from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
-class CrackOpening:
+class CrackOpening(Criterion):
     """Growth when the opening at a distance behind the tip reaches a critical one.
 
     Attributes:
@@ -45,8 +47,9 @@ class CrackOpening:
     symmetry: bool = field(default=False, kw_only=True)
     tolerance: float = field(default=0.1, kw_only=True)
 
+    degree: ClassVar[float] = 1.0
     allows_normal_only: ClassVar[bool] = True
-    """Whether a bond in the normal direction only is possible."""
+    release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "time"))
 
     def __post_init__(self) -> None:
         """Check the numbers and the table."""
@@ -68,19 +71,10 @@ class CrackOpening:
             positive(owner, **{f"critical openings[{i}]": value})
         object.__setattr__(self, "critical", (lengths, values))
 
-    @property
-    def release_range(self) -> tuple[float, float]:
-        """Lower and upper limit of f at which a node may debond."""
-        return 1.0 - self.tolerance, 1.0 + self.tolerance
-
     def check_bond(self, *, normal_only: bool) -> None:
-        """Check the criterion against the bond it is used on.
+        """Refuse symmetry with a bond in all directions.
 
-        Args:
-            normal_only: Whether the bond holds in the normal direction only.
-
-        Raises:
-            InputError: Symmetry with a bond in all directions.
+        Argument and error as for :meth:`Criterion.check_bond`.
         """
         if self.symmetry and not normal_only:
             raise InputError(
@@ -150,8 +144,6 @@ class OpeningEvaluator(_AtDistance):
         InputError: The distance lies outside the end points of the pair, or the critical opening
             depends on temperature and there is none.
     """
-
-    ahead = 0.0
 
     def __init__(
         self,

@@ -18,6 +18,8 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import not_negative, number, positive
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.at_distance import _ROUND_OFF, _AtDistance, _on_face
+from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.release_laws import Driver
 from fxcrack.criteria.toughness import Tabulated
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import Tips
@@ -25,7 +27,7 @@ from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
-class CriticalStress:
+class CriticalStress(Criterion):
     """Growth when the stress at a distance ahead of the tip reaches the strength.
 
     Attributes:
@@ -42,8 +44,9 @@ class CriticalStress:
     distance: float = field(kw_only=True)
     tolerance: float = field(default=0.1, kw_only=True)
 
+    degree: ClassVar[float] = 1.0
     allows_normal_only: ClassVar[bool] = True
-    """Whether a bond in the normal direction only is possible."""
+    release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "time"))
 
     def __post_init__(self) -> None:
         """Check the numbers."""
@@ -58,11 +61,6 @@ class CriticalStress:
                 raise InputError(
                     f"{owner}: {name} = {value} must be positive; None or 0 for no effect"
                 )
-
-    @property
-    def release_range(self) -> tuple[float, float]:
-        """Lower and upper limit of f at which a node may debond."""
-        return 1.0 - self.tolerance, 1.0 + self.tolerance
 
     def strength(self, temperature: npt.ArrayLike | None = None) -> Array:
         """Strengths (normal, along growth, along the front), infinite where there is no effect.
@@ -126,8 +124,6 @@ class StressEvaluator(_AtDistance):
         InputError: The distance lies outside the bonded part ahead of an initial tip on a line
             (a warning on a surface), or a strength depends on temperature and there is none.
     """
-
-    behind = 0.0
 
     def __init__(
         self,

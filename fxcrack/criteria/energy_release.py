@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 import numpy.typing as npt
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import not_negative, one_of
 from fxcrack.base.errors import InputError
@@ -18,11 +19,12 @@ from fxcrack.criteria.crack_closure import (
     closure_weights,
     weighted_rates,
 )
-from fxcrack.criteria.evaluator import TipValues, first_tips
+from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
 from fxcrack.criteria.mixed_mode import BK, MixedMode, total
 from fxcrack.criteria.probe import bond_forces, closure_jumps, openings
-from fxcrack.criteria.release_laws import RampRelease, Release
+from fxcrack.criteria.release_laws import Driver, ReleaseLaw
 from fxcrack.criteria.toughness import Property, check_property, resolve
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.contact import Equilibrium
@@ -34,7 +36,7 @@ Method = Literal["vcct", "closure"]
 
 
 @dataclass(frozen=True, eq=False)
-class RateCriterion:
+class RateCriterion(Criterion):
     """What the criteria on energy release rates share: toughness, mode mix, how G is computed.
 
     Attributes:
@@ -58,8 +60,9 @@ class RateCriterion:
     method: Method = field(default="vcct", kw_only=True)
     normalisation: Normalisation = field(default="tributary", kw_only=True)
 
-    allows_normal_only: ClassVar[bool] = False
-    """Whether a bond in the normal direction only is possible."""
+    knows_toughness: ClassVar[bool] = True
+    release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "increments", "opening"))
+    smallest_increment_when_met: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Check everything that does not need the interface."""
@@ -78,6 +81,21 @@ class RateCriterion:
             )
         for name, value in self._properties().items():
             check_property(self._owner, name, value)
+
+    @property
+    def degree(self) -> float | None:
+        """Twice the degree of the mode-mix law: rates grow with the square of the load."""
+        return None if self.law.degree is None else 2.0 * self.law.degree
+
+    @property
+    def needs_exact_S(self) -> bool:
+        """Exact crack closure releases units in the present state."""
+        return self.method == "closure"
+
+    @property
+    def needs_wake_openings(self) -> bool:
+        """Virtual crack closure multiplies forces with the openings behind."""
+        return self.method == "vcct"
 
     @property
     def _owner(self) -> str:
@@ -199,7 +217,7 @@ class RateCriterion:
         return self.law.critical(rates, toughness)
 
 
-class RateEvaluator:
+class RateEvaluator(SofteningEvaluator):
     """Energy release rates by crack closure, for VCCT and the criteria built on it.
 
     Args:
@@ -210,10 +228,6 @@ class RateEvaluator:
         softens: Whether bonds soften with their opening: second-order fronts then let go by element
             edges, and f is that of the edge.
     """
-
-    degree = 2
-    ahead = 0.0
-    behind = 0.0
 
     def __init__(
         self,
@@ -233,11 +247,26 @@ class RateEvaluator:
         self._weights = np.zeros((0, 1))
         surface = solver.pairs[p].surface
         criterion.check_slaves(surface.n_nodes)
+        if softens and criterion.needs_exact_S and not criterion.softens:
+            # The energy of releasing the node is the one it is to spend: its bond softens as fast
+            # as the bodies give way.
+            log.warn(
+                "interface '%s': a bond whose onset is found by method='closure' is neutral there "
+                "and runs open at once, as with StepRelease, though its release is to follow the "
+                "opening; wide fronts carry a third too much so. Take method='vcct', or use "
+                "StepRelease",
+                solver.pairs[p].title,
+            )
         x = surface.x[:, : solver.continuum.gdim]
         self._temperature = temperature
         self._moving = temperature is not None and not temperature.steady
         at_start = None if temperature is None else temperature(0.0)
         self.toughness = criterion.toughness_at(x, np.arange(len(x)), at_start, n_slave=len(x))
+
+    @property
+    def degree(self) -> float | None:
+        """That of the criterion; toughness that changes in time leaves none."""
+        return None if self._moving else self.criterion.degree
 
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
         """Tip forces and the openings they are multiplied with, shape (n, 6 k).
@@ -308,7 +337,7 @@ class RateEvaluator:
         x = surface.x[tips.node, : self.solver.continuum.gdim]
         return self.criterion.toughness_at(x, tips.node, measured[:, -1], n_slave=surface.n_nodes)
 
-    def to_soften(self, nodes: Ints, values: TipValues, release: Release) -> list[CohesiveUnit]:
+    def to_soften(self, nodes: Ints, values: TipValues, release: ReleaseLaw) -> list[CohesiveUnit]:
         """Nodes that soften by one law each, and the energy it dissipates until they are free.
 
         All nodes of a unit share a law: their forces, pressed ones included, fall in proportion,
@@ -336,9 +365,8 @@ class RateEvaluator:
             toughness = propagation
         rates, toughness = units.mean(rates), units.mean(toughness)
         critical = self.criterion.critical(rates, toughness)
-        if isinstance(release, RampRelease) and propagation is None:
-            # 1/2 F0 w_c with the opening of the wake: what crack closure calls G A
-            critical = total(rates)
+        if propagation is None:
+            critical = release.spent(total(rates), critical)
         if np.any(critical > UNBOUNDED_RATE * toughness[:, 0]):
             worst = units.leaders[np.argmax(critical)]
             raise NotPositiveDefinite(int(tips.node[worst]))
@@ -357,10 +385,6 @@ class RateEvaluator:
             energy = float(critical[k] * surface.areas[unit].sum())
             out.append(CohesiveUnit(unit, energy, bool(rates[k, 0] <= 0.0)))
         return out
-
-    def needs(self, tips: Tips) -> Ints:
-        """Nothing beyond the tips themselves."""
-        return np.zeros(0, dtype=np.int64)
 
     def breaks(self) -> tuple[float, ...]:
         """Rates do not depend on time as such; a temperature does."""

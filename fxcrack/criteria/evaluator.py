@@ -13,8 +13,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.criteria.release_laws import ReleaseLaw
+from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.interface.tips import Tips
+from fxcrack.interface.tips import FrontUnits, Tips
 
 
 @dataclass(frozen=True)
@@ -46,26 +48,53 @@ class Evaluator(Protocol):
     """A criterion applied to a model.
 
     Attributes:
-        degree: f grows with this power of a proportional load.
         ahead: Distance ahead of a tip whose bond forces are needed, length.
         behind: Distance behind a tip whose openings are needed, length.
+        ends: Time after which nothing grows any more.
     """
 
-    degree: int
-    ahead: float
-    behind: float
+    ahead: float = 0.0
+    behind: float = 0.0
+    ends: float = float("inf")
+
+    @property
+    def degree(self) -> float | None:
+        """Power of a proportional load with which f grows; None where it does not so."""
+        return None
 
     def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
         """Quantities linear between equilibria, shape (n_tips, m)."""
+        ...
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and report from measured quantities, shape (n_tips, m)."""
+        ...
 
     def needs(self, tips: Tips) -> Ints:
-        """Slave nodes beyond force and wake nodes whose jumps the window must hold."""
+        """Slave nodes beyond force and wake nodes whose jumps must be retained, shape (m,)."""
+        return np.zeros(0, dtype=np.int64)
 
     def breaks(self) -> tuple[float, ...]:
-        """Times at which what is measured bends."""
+        """Times at which the rate of what is measured changes."""
+        return ()
+
+
+class SofteningEvaluator(Evaluator, Protocol):
+    """An evaluator that knows the energy which released bonds spend."""
+
+    def units(self, tips: Tips) -> FrontUnits:
+        """Tips that are released together, by one law."""
+        ...
+
+    def to_soften(self, nodes: Ints, values: TipValues, release: ReleaseLaw) -> list[CohesiveUnit]:
+        """Nodes that soften by one law each, and the energy it dissipates until they are free.
+
+        Args:
+            nodes: All nodes that are released now, shape (n,).
+            values: What the criterion says at the front they are part of.
+            release: How they are released.
+        """
+        ...
 
 
 _ROUND_OFF = 1e-13
@@ -119,19 +148,22 @@ def first_crossing(
         for state, time in ends
     )
     n = len(tips)
-    if known is not None and known.measured is a and known.f.max() > 0.0:
+    degree = evaluator.degree
+    if degree is not None and known is not None and known.measured is a and known.f.max() > 0.0:
         scale = float(np.vdot(a, b) / np.vdot(a, a))
         if np.abs(b - scale * a).max() <= _ROUND_OFF * np.abs(b).max():
             # proportional: f grows with a power of the load
-            rise = known.f.max() ** (-1.0 / evaluator.degree) - 1.0
+            rise = known.f.max() ** (-1.0 / degree) - 1.0
             x = rise / (scale - 1.0) if scale != 1.0 else np.inf
             return float(x) if 0.0 <= x <= 1.0 else None
+
+    power = 1.0 if degree is None else 1.0 / degree
 
     def root(x: Array) -> Array:
         many = np.concatenate([(1.0 - y) * a + y * b for y in x])
         f, _ = evaluator.value(repeat_tips(tips, len(x)), many)
         largest = np.maximum(f.reshape(len(x), n).max(axis=1), 0.0)
-        return np.asarray(largest ** (1.0 / evaluator.degree) - 1.0)
+        return np.asarray(largest**power - 1.0)
 
     grid = np.linspace(0.0, 1.0, 9)
     values = root(grid)

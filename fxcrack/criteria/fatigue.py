@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from enum import IntEnum
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -104,6 +104,13 @@ class Fatigue(RateCriterion):
 
     paris: Paris
     credit: bool = field(default=False)
+
+    grows_in_cycles: ClassVar[bool] = True
+
+    @property
+    def life_exponent(self) -> float:
+        """Exponent of growth."""
+        return self.paris.c4
 
     def __post_init__(self) -> None:
         """Check everything that does not need the interface."""

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +25,11 @@ from fxcrack.base.checks import positive
 
 class MixedMode(Protocol):
     """What every mode-mix law can do."""
+
+    @property
+    def degree(self) -> float | None:
+        """Power of the rates with which f grows when all grow in proportion; None: no power."""
+        ...
 
     def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Value f of the criterion, shape (n,); growth at 1."""
@@ -58,6 +63,8 @@ class _ShearExponent(ABC):
     """What the laws have in common that blend toughnesses by the share of shear, B^eta."""
 
     eta: float
+
+    degree: ClassVar[float] = 1.0
 
     def __post_init__(self) -> None:
         """Check the exponent."""
@@ -138,6 +145,12 @@ class Power:
     def exponents(self) -> Array:
         """The three exponents, shape (3,)."""
         return np.array([self.am, self.an, self.an if self.ao is None else self.ao])
+
+    @property
+    def degree(self) -> float | None:
+        """The exponent all modes share; None where they differ."""
+        first = self.exponents[0]
+        return float(first) if np.all(self.exponents == first) else None
 
     def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Value f of the criterion, the sum of the powers.

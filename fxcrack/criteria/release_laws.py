@@ -3,7 +3,8 @@
 A law gives the fraction phi of the bond force F0 at debonding that remains, F = phi F0. What
 drives it is told by ``driver``:
 
-    "increments"  increments since debonding          StepRelease, RampRelease(increments=...)
+    "once"        nothing: all of it goes             StepRelease
+    "increments"  increments since debonding          RampRelease(increments=...)
     "time"        time since debonding                AmplitudeRelease
     "opening"     largest opening over final one      RampRelease, ProgressiveRelease
 
@@ -12,13 +13,15 @@ In the last case phi = 1 - w/w_f, w the opening along F0's direction. The final 
 released,
 
     1/2 |F0| w_f = G_c A.
+
+A new law is one class derived from :class:`ReleaseLaw`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +30,62 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.checks import positive, table
 from fxcrack.base.errors import InputError
 
-Driver = Literal["increments", "time", "opening"]
+Driver = Literal["once", "increments", "time", "opening"]
+
+_NAMES: dict[Driver, str] = {
+    "once": "StepRelease",
+    "increments": "RampRelease(increments=...)",
+    "time": "AmplitudeRelease",
+    "opening": "ProgressiveRelease",
+}
+
+
+def names_of(drivers: Iterable[Driver]) -> str:
+    """The laws of this module that some drivers stand for, in words."""
+    *some, last = [name for driver, name in _NAMES.items() if driver in set(drivers)]
+    return f"{', '.join(some)} or {last}" if some else last
+
+
+class ReleaseLaw(Protocol):
+    """How the bond force of a node goes to zero after debonding.
+
+    A class that does not derive from it must have all of its members.
+    """
+
+    @property
+    def driver(self) -> Driver:
+        """What the force falls with; this decides how a release begins.
+
+        "once": it goes in the increment that follows debonding. "increments", "time": it follows
+        :meth:`remaining`. "opening": it falls linearly until the energy :meth:`spent` is spent.
+        """
+        ...
+
+    def remaining(self, progress: npt.ArrayLike) -> Array:
+        """Remaining fraction of the force at debonding, of the shape of ``progress``.
+
+        Args:
+            progress: Increments or time since debonding, or the largest opening over the final one.
+        """
+        ...
+
+    def breaks(self) -> tuple[float, ...]:
+        """Times since debonding at which the fraction changes its slope [time]."""
+        return ()
+
+    @property
+    def suggested_increment(self) -> float:
+        """Increment suggested for the first one after debonding [time]; inf: none."""
+        return float("inf")
+
+    def spent(self, rate: Array, critical: Array) -> Array:
+        """Energy per area that bonds spend whose force falls with opening, shape (n,).
+
+        Args:
+            rate: Total energy release rate at debonding, shape (n,) [force/length].
+            critical: Total rate at which growth starts at this mode mix, likewise.
+        """
+        return critical
 
 
 def _linear(largest: npt.ArrayLike, final: float) -> Array:
@@ -37,10 +95,10 @@ def _linear(largest: npt.ArrayLike, final: float) -> Array:
 
 
 @dataclass(frozen=True)
-class StepRelease:
+class StepRelease(ReleaseLaw):
     """The whole force goes in the increment that follows debonding."""
 
-    driver: ClassVar[Driver] = "increments"
+    driver: ClassVar[Driver] = "once"
 
     def remaining(self, increments: npt.ArrayLike) -> Array:
         """Remaining fraction after so many increments since debonding, of their shape."""
@@ -48,7 +106,7 @@ class StepRelease:
 
 
 @dataclass(frozen=True)
-class RampRelease:
+class RampRelease(ReleaseLaw):
     """The force goes linearly, with opening or over a number of increments.
 
     With opening it ends at the opening the wake node had when the front node debonded, so that on
@@ -83,9 +141,16 @@ class RampRelease:
         """
         return _linear(progress, 1.0 if self.increments is None else self.increments)
 
+    def spent(self, rate: Array, critical: Array) -> Array:
+        """The rate itself: 1/2 F0 w_c with the opening of the wake is what crack closure calls G A.
+
+        Arguments as for :meth:`ReleaseLaw.spent`.
+        """
+        return rate
+
 
 @dataclass(frozen=True)
-class ProgressiveRelease:
+class ProgressiveRelease(ReleaseLaw):
     """The force falls linearly with opening so that exactly the toughness is spent.
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
@@ -104,7 +169,7 @@ class ProgressiveRelease:
 
 
 @dataclass(frozen=True)
-class AmplitudeRelease:
+class AmplitudeRelease(ReleaseLaw):
     """The force follows a curve of time since debonding, from 1 to 0.
 
     Attributes:
@@ -144,11 +209,12 @@ class AmplitudeRelease:
         """Increment suggested for the first one after debonding [time]."""
         return self.times[-1] if self.first_increment is None else self.first_increment
 
-    def remaining(self, elapsed: npt.ArrayLike) -> Array:
+    def breaks(self) -> tuple[float, ...]:
+        """Times since debonding at which the curve bends [time]."""
+        return tuple(self.times)
+
+    def remaining(self, progress: npt.ArrayLike) -> Array:
         """Remaining fraction at times since debonding, of their shape."""
         return np.asarray(
-            np.interp(np.asarray(elapsed, dtype=np.float64), self.times, self.fractions)
+            np.interp(np.asarray(progress, dtype=np.float64), self.times, self.fractions)
         )
-
-
-Release = StepRelease | RampRelease | ProgressiveRelease | AmplitudeRelease

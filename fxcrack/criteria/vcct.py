@@ -11,6 +11,7 @@ growth direction, front tangent). Growth when f of the mode-mix law reaches 1.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -76,6 +77,8 @@ class EnhancedVCCT(VCCT):
     GIc_p: Property
     GIIc_p: Property | None = None
     GIIIc_p: Property | None = None
+
+    softens: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         """Check everything that does not need the interface."""

@@ -268,7 +268,7 @@ class Analysis:
             spent = float(force @ here.jump[index] - last @ point.jump[index])
             spent += float((last - force) @ mean[index])
             balance.by_force += spent
-            balance.viscous += ramp.viscous_part(self.solver, spent, (here, point))
+            balance.viscous += ramp.viscous_part(spent, self.solver, here.jump, point.jump)
         self.solver.state = point
         balance.time = time
 

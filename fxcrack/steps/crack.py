@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -12,17 +13,15 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
-    VCCT,
     CrackLengthVsTime,
     CrackOpening,
     CriticalStress,
-    Tabulated,
 )
 from fxcrack.criteria.crack_length_vs_time import LengthEvaluator
 from fxcrack.criteria.crack_opening import OpeningEvaluator
 from fxcrack.criteria.critical_stress import StressEvaluator
 from fxcrack.criteria.energy_release import RateEvaluator
-from fxcrack.criteria.evaluator import Evaluator, TipValues, first_crossing
+from fxcrack.criteria.evaluator import Evaluator, SofteningEvaluator, TipValues, first_crossing
 from fxcrack.criteria.interface_temperature import given_temperature, scene_temperature
 from fxcrack.criteria.probe import openings
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
@@ -32,7 +31,7 @@ from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.bond_records import ReleaseRecord, release_records
-from fxcrack.steps.debond import Criterion, Debond, _warn_of_neutral_onset, softens
+from fxcrack.steps.debond import Debond, softens
 
 _TIE = 1e-6
 """Front nodes whose f lies within this fraction of the largest one are let go together."""
@@ -61,13 +60,8 @@ class Crack:
         self.title = debond.interface.title
         self.debond = debond
         self.criterion = debond.criterion
-        self.unstable_tolerance: float | None = getattr(
-            debond.criterion, "unstable_tolerance", None
-        )
         self.front = solver.fronts[p]
         self.extent = CrackExtent(self.front)
-        if isinstance(debond.criterion, VCCT) and softens(debond):
-            _warn_of_neutral_onset(debond.criterion, self.title)
         self.evaluator: Evaluator = make_evaluator(
             solver, p, debond.criterion, debond.temperature, softens=softens(debond)
         )
@@ -102,7 +96,7 @@ class Crack:
         Raises:
             InputError: A support holds the node behind a tip but not its master in the same way.
         """
-        if getattr(self.criterion, "method", "") != "vcct":
+        if not self.criterion.needs_wake_openings:
             return
         for node, wake in zip(tips.node, tips.wake_nodes, strict=True):
             if not self.solver.holds(self.p, wake.ravel()):
@@ -163,6 +157,11 @@ class Crack:
         return np.flatnonzero(values.f >= values.f.max() * (1.0 - _TIE))
 
     @property
+    def degree(self) -> float:
+        """Power of the load with which f grows, for predictions; 2, as of rates, if unknown."""
+        return 2.0 if self.evaluator.degree is None else self.evaluator.degree
+
+    @property
     def opening_driven(self) -> bool:
         """Whether bond forces fall with their opening."""
         return softens(self.debond)
@@ -176,7 +175,7 @@ class Crack:
         """
         tips = values.tips
         if self.opening_driven:
-            units = self._by_rates.units(tips)
+            units = self._softening.units(tips)
             chosen = np.union1d(chosen, np.nonzero(units.shares[np.isin(units.leaders, chosen)])[1])
         return np.unique(tips.force_nodes[chosen])
 
@@ -186,12 +185,12 @@ class Crack:
         Progressive release: the critical rate at the present mode mix times the area; enhanced
         VCCT: that of propagation; ramp: half the force times the wake opening at onset.
         """
-        return self._by_rates.to_soften(nodes, values, self.debond.release)
+        return self._softening.to_soften(nodes, values, self.debond.release)
 
     @property
-    def _by_rates(self) -> RateEvaluator:
-        assert isinstance(self.evaluator, RateEvaluator)
-        return self.evaluator
+    def _softening(self) -> SofteningEvaluator:
+        """The evaluator, of a criterion that knows its toughness: others never soften."""
+        return cast(SofteningEvaluator, self.evaluator)
 
     def record(self, nodes: Ints, values: TipValues, state: Equilibrium, time: float) -> None:
         """Note nodes that are about to be released."""
@@ -202,7 +201,7 @@ class Crack:
 def make_evaluator(
     solver: LinearSolver,
     p: int,
-    criterion: Criterion,
+    criterion: Any,
     temperature: float | Callable[[Array], npt.ArrayLike] | None = None,
     *,
     softens: bool = False,
@@ -214,7 +213,7 @@ def make_evaluator(
     """
     pair, continuum = solver.pairs[p], solver.continuum
     known = given_temperature(pair, continuum.gdim, temperature)
-    if known is None and any(isinstance(v, Tabulated) for v in vars(criterion).values()):
+    if known is None and criterion.needs_temperature:
         known = scene_temperature(pair, continuum)
     if isinstance(criterion, CrackLengthVsTime):
         return LengthEvaluator(solver, p, criterion)

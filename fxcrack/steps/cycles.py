@@ -15,7 +15,6 @@ import numpy as np
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
-from fxcrack.criteria import Fatigue, StepRelease
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Time, Until, conditions
 from fxcrack.steps.static import Static
@@ -156,19 +155,20 @@ def check_criteria(step: Static | Cycles, debonds: Sequence[Debond]) -> None:
     for debond in debonds:
         who = f"interface '{debond.interface.title}'"
         if not isinstance(step, Cycles):
-            if isinstance(debond.criterion, Fatigue):
+            if debond.criterion.grows_in_cycles:
                 raise InputError(
-                    f"{who} has a Fatigue criterion, which needs cycles: run fx.Cycles(...), or "
-                    "leave it out of this step, grow=[other debonds]; it stays tied then"
+                    f"{who} has a {type(debond.criterion).__name__} criterion, which needs cycles: "
+                    "run fx.Cycles(...), or leave it out of this step, grow=[other debonds]; it "
+                    "stays tied then"
                 )
             continue
-        if not isinstance(debond.criterion, Fatigue):
+        if not debond.criterion.grows_in_cycles:
             raise InputError(
                 f"{who} has the criterion {type(debond.criterion).__name__}, which does not grow "
                 "in cycles: use Fatigue, or leave it out of this step, grow=[other debonds]; it "
                 "stays tied then"
             )
-        if not isinstance(debond.release, StepRelease):
+        if debond.release.driver != "once":
             raise InputError(
                 f"{who}: in cycles bonds are released at once; use release=StepRelease() (the "
                 f"default) instead of {type(debond.release).__name__}"

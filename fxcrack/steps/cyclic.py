@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -216,16 +216,14 @@ class _Cycling:
         """Total rate at the tips of all interfaces, shape (n_tips,), force/length."""
         sums = [np.zeros(0)]
         for (g, v), values in zip(self._analysis.at_tips(), measured, strict=True):
-            assert isinstance(g.evaluator, RateEvaluator)
             if len(v.tips):
-                sums.append(total(g.evaluator.rates(v.tips, values)))
+                sums.append(total(cyclic_parts(g)[1].rates(v.tips, values)))
         return np.concatenate(sums)
 
     def _extremes(self, way: list[_Instant]) -> list[TipCycle]:
-        out = []
+        out: list[TipCycle] = []
         for i, (g, v) in enumerate(self._analysis.at_tips()):
-            evaluator, criterion = g.evaluator, g.criterion
-            assert isinstance(evaluator, RateEvaluator) and isinstance(criterion, Fatigue)
+            criterion, evaluator = cyclic_parts(g)
             if not len(v.tips):
                 out.append(TipCycle(*np.zeros((4, 0))))
                 continue
@@ -247,7 +245,7 @@ class _Cycling:
     def _jump(self) -> CycleJump:
         """Jump over cycles like the present one, all interfaces together, and tabulate it."""
         fatigue, before = self._analysis.fatigue, self._analysis.fatigue.N
-        criteria = [g.criterion for g in self._analysis.active if isinstance(g.criterion, Fatigue)]
+        criteria = [cyclic_parts(g)[0] for g in self._analysis.active]
         tips = [v.tips for v in self._analysis.tip_values]
         counts = [len(t) for t in tips]
         on = [(g.p, t.node) for g, t in zip(self._analysis.active, tips, strict=True)]
@@ -337,6 +335,14 @@ class _SideBySide(Paris):
     def regime(self, G_max: npt.ArrayLike, G_c: npt.ArrayLike) -> npt.NDArray[np.int64]:
         """Regime of each tip."""
         return self._each("regime", G_max, G_c)
+
+
+def cyclic_parts(crack: Crack) -> tuple[Fatigue, RateEvaluator]:
+    """Criterion and evaluator of a crack that grows in cycles.
+
+    :func:`fxcrack.steps.cycles.check_criteria` has let nothing else pass.
+    """
+    return cast(Fatigue, crack.criterion), cast(RateEvaluator, crack.evaluator)
 
 
 def together(laws: Sequence[Paris], counts: Sequence[int]) -> Paris:

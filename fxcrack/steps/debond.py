@@ -7,23 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy.typing as npt
 
-from fxcrack.base import log
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import missing_members, number
 from fxcrack.base.errors import InputError
-from fxcrack.criteria import (
-    VCCT,
-    AmplitudeRelease,
-    CrackLengthVsTime,
-    CrackOpening,
-    CriticalStress,
-    EnhancedVCCT,
-    RateCriterion,
-    Release,
-    StepRelease,
-)
+from fxcrack.criteria import Criterion, ReleaseLaw, StepRelease, release_laws
 from fxcrack.interface.pairing import Interface, Pair
-
-Criterion = RateCriterion | CriticalStress | CrackOpening | CrackLengthVsTime
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,41 +29,56 @@ class Debond:
 
     interface: Interface
     criterion: Criterion
-    release: Release = field(default_factory=StepRelease)
+    release: ReleaseLaw = field(default_factory=StepRelease)
     watch: Sequence[Criterion] = ()
     temperature: float | Callable[[Array], npt.ArrayLike] | None = None
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""
         where = f"interface '{self.interface.title}'"
-        name, law = type(self.criterion).__name__, type(self.release).__name__
-        if not isinstance(self.criterion, Criterion):
-            raise InputError(f"{where}: {name} is not a criterion; give VCCT or another of them")
-        if not hasattr(self.release, "driver") or isinstance(self.release, type):
+        for criterion in (self.criterion, *self.watch):
+            check_criterion(where, criterion)
+        missing = missing_members(self.release, ReleaseLaw)
+        if missing:
             raise InputError(
-                f"{where}: release = {self.release!r} is no release law; give "
-                "StepRelease(), ProgressiveRelease(), RampRelease() or AmplitudeRelease(...)"
+                f"{where}: release = {self.release!r} is no release law ({missing}); give "
+                "StepRelease(), ProgressiveRelease(), RampRelease(), AmplitudeRelease(...) or a "
+                "class derived from ReleaseLaw"
             )
-        if not isinstance(self.criterion, RateCriterion):
-            if not isinstance(self.release, StepRelease | AmplitudeRelease):
-                raise InputError(
-                    f"{where}: {law} is not possible with {name}, which knows no toughness; "
-                    "use StepRelease or AmplitudeRelease"
-                )
-            if isinstance(self.criterion, CrackOpening):
-                self.criterion.check_bond(normal_only=self.interface.normal_only)
-            return
-        if self.interface.normal_only:
+        possible = self.criterion.release_drivers
+        if self.release.driver not in possible:
             raise InputError(
-                f"{where}: bonds in the normal direction only are not possible with {name}; bond "
-                "in all directions, or use a critical stress, opening or crack length criterion"
+                f"{where}: {type(self.release).__name__} is not possible with "
+                f"{type(self.criterion).__name__}"
+                f"{'' if self.criterion.knows_toughness else ', which knows no toughness'}; use "
+                f"{release_laws.names_of(possible)}"
             )
-        if isinstance(self.release, AmplitudeRelease):
-            raise InputError(
-                f"{where}: {law} is not possible with {name}; its bonds are released by "
-                "StepRelease, RampRelease or ProgressiveRelease; an amplitude of time serves the "
-                "critical stress, opening and crack length criteria"
-            )
+        try:
+            self.criterion.check_bond(normal_only=self.interface.normal_only)
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+
+
+def check_criterion(where: str, criterion: Criterion) -> None:
+    """Refuse what is no criterion.
+
+    Raises:
+        InputError: A member of the protocol is missing, or a number is none.
+    """
+    missing = missing_members(criterion, Criterion)
+    if missing:
+        raise InputError(
+            f"{where}: {type(criterion).__name__} is not a criterion ({missing}); give VCCT or "
+            "another of them, or derive yours from Criterion"
+        )
+    owner = f"{where}: {type(criterion).__name__}"
+    low, high = criterion.release_range
+    number(owner, "release_range[0]", low)
+    number(owner, "release_range[1]", high)
+    number(owner, "viscosity", criterion.viscosity)
+    for name in ("degree", "unstable_tolerance"):
+        if getattr(criterion, name) is not None:
+            number(owner, name, getattr(criterion, name))
 
 
 def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
@@ -95,21 +98,6 @@ def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
             )
 
 
-def _warn_of_neutral_onset(criterion: VCCT, title: str) -> None:
-    """Say what softening from an onset by exact crack closure does.
-
-    There the energy of letting the node go is the one it is to spend: its bond softens as fast as
-    the bodies give way.
-    """
-    if criterion.method == "closure" and not isinstance(criterion, EnhancedVCCT):
-        log.warn(
-            "interface '%s': a bond whose onset is found by method='closure' is neutral there and "
-            "opens at once, as with StepRelease, though its release is to follow the opening; wide "
-            "fronts then carry a third too much load. Take method='vcct', or use StepRelease",
-            title,
-        )
-
-
 def softens(debond: Debond) -> bool:
     """Whether bond forces fall with their opening."""
-    return debond.release.driver == "opening" or isinstance(debond.criterion, EnhancedVCCT)
+    return debond.release.driver == "opening" or debond.criterion.softens

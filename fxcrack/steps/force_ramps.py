@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import InputError
-from fxcrack.criteria import AmplitudeRelease, RampRelease
-from fxcrack.criteria import Release as ReleaseLaw
+from fxcrack.criteria import ReleaseLaw
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.friction_state import contact_share
 from fxcrack.solvers.linear import LinearSolver
 
@@ -32,7 +30,7 @@ class PrescribedRamp:
     p: int
     nodes: Ints
     force: Array
-    law: AmplitudeRelease | RampRelease
+    law: ReleaseLaw
     start: float
 
     @classmethod
@@ -40,8 +38,6 @@ class PrescribedRamp:
         cls, solver: LinearSolver, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> PrescribedRamp:
         """Note the bond forces of nodes that are about to be released."""
-        if not isinstance(law, AmplitudeRelease | RampRelease):
-            raise InputError(f"{type(law).__name__} is no release with time or increments")
         return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
 
     @property
@@ -55,23 +51,18 @@ class PrescribedRamp:
 
     def breaks(self) -> tuple[float, ...]:
         """Times at which the amplitude changes its slope."""
-        if not isinstance(self.law, AmplitudeRelease):
-            return ()
-        return tuple(self.start + t for t in self.law.times)
+        return tuple(self.start + t for t in self.law.breaks()) if self.by_time else ()
 
-    def first_increment(self, time: float) -> float:
-        """Increment the amplitude suggests where the release begins at a time, else infinite."""
-        if not isinstance(self.law, AmplitudeRelease) or self.start != time:
-            return np.inf
+    @property
+    def suggested_increment(self) -> float:
+        """Increment suggested for the first one after debonding, time."""
         return self.law.suggested_increment
 
     def accept(self, time: float, solver: LinearSolver) -> None:
-        """Nothing to do: the force depends on the time or the increment alone."""
+        """Nothing: the fraction depends on what has passed since debonding alone."""
 
-    def viscous_part(
-        self, solver: LinearSolver, spent: float, ends: tuple[Equilibrium, Equilibrium]
-    ) -> float:
-        """Energy of a piece that viscosity took: none."""
+    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+        """Part of the energy spent between two states that viscosity took: none."""
         return 0.0
 
     def now(self, time: float, increment: int) -> float:
@@ -104,9 +95,15 @@ class ViscousRamp:
     by_time: bool = True
     start: float = float("nan")
 
+    suggested_increment: ClassVar[float] = float("inf")
+
     def fraction(self, now: float) -> float:
         """Remaining fraction at the end of an increment."""
         return self.remaining * self.viscosity / (self.viscosity + max(now - self.time, 0.0))
+
+    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+        """Part of the energy spent between two states that viscosity took: all of it."""
+        return spent
 
     def accept(self, time: float, solver: LinearSolver) -> None:
         """Go on from the end of an accepted increment."""
@@ -115,16 +112,6 @@ class ViscousRamp:
     def breaks(self) -> tuple[float, ...]:
         """None: the force is known at increments only."""
         return ()
-
-    def first_increment(self, time: float) -> float:
-        """Infinite: no increment is suggested."""
-        return np.inf
-
-    def viscous_part(
-        self, solver: LinearSolver, spent: float, ends: tuple[Equilibrium, Equilibrium]
-    ) -> float:
-        """Energy of a piece that viscosity took: all that left through these bonds."""
-        return spent
 
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time."""
@@ -162,6 +149,8 @@ class ViscousCohesiveRamp:
     lagging: Array
     by_time: bool = True
     start: float = float("nan")
+
+    suggested_increment: ClassVar[float] = float("inf")
 
     @classmethod
     def begin(
@@ -210,6 +199,20 @@ class ViscousCohesiveRamp:
         whole = 0.5 * _sizes(self.force, self.unit) * self.final
         return float(whole @ (1.0 - left**2))
 
+    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+        """Part of the energy spent between two states that viscosity took.
+
+        It is what the law without viscosity would not have spent.
+
+        Args:
+            spent: Energy spent, force times length.
+            solver: The solver.
+            here: Jumps of the first state, shape (n_retained,).
+            there: Jumps of the second state, likewise.
+        """
+        law = [self.fracture_energy(solver, jump) for jump in (here, there)]
+        return spent - (law[1] - law[0])
+
     def accept(self, time: float, solver: LinearSolver) -> None:
         """Go on from the end of an accepted increment."""
         self.lagging = self._lagging_at(time)
@@ -218,23 +221,6 @@ class ViscousCohesiveRamp:
     def breaks(self) -> tuple[float, ...]:
         """None: the force is known at increments only."""
         return ()
-
-    def first_increment(self, time: float) -> float:
-        """Infinite: no increment is suggested."""
-        return np.inf
-
-    def viscous_part(
-        self, solver: LinearSolver, spent: float, ends: tuple[Equilibrium, Equilibrium]
-    ) -> float:
-        """Energy of a piece that viscosity took: what left beyond the law's fracture energy.
-
-        Args:
-            solver: The solver.
-            spent: Energy that left through these bonds on the piece, force times length.
-            ends: Equilibria at both ends of the piece.
-        """
-        before, after = (self.fracture_energy(solver, state.jump) for state in ends)
-        return spent - (after - before)
 
     def now(self, time: float, increment: int) -> float:
         """What drives it: the time."""

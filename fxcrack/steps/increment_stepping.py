@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from fxcrack.base.errors import ComesApart, ConvergenceError
-from fxcrack.criteria import RateCriterion
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.steps.analysis import Analysis, largest
@@ -96,10 +95,15 @@ def _release_ready(driver: StepDriver, control: IncrementControl) -> None:
     while _any_ready(analysis) and not driver.ended():
         release_critical(analysis, all_ready=True)
         driver.record("release")
-        time = analysis.time
-        control.suggest(min((r.first_increment(time) for r in analysis.ramps), default=np.inf))
+        control.suggest(_first_increment(analysis))
         if not _may_run_on(analysis):
             return
+
+
+def _first_increment(analysis: Analysis) -> float:
+    """Increment suggested after a release has just begun, infinite without a suggestion."""
+    begun = [r for r in analysis.ramps if r.by_time and r.start == analysis.time]
+    return min((r.suggested_increment for r in begun), default=np.inf)
 
 
 def _scaled(analysis: Analysis, step: Static) -> float:
@@ -108,7 +112,7 @@ def _scaled(analysis: Analysis, step: Static) -> float:
     if beta is None or time <= 0.0 or any(g.n_released for g in analysis.active):
         return 0.0
     reach = [
-        float(v.f.max()) ** (-1.0 / g.evaluator.degree)
+        float(v.f.max()) ** (-1.0 / g.degree)
         for g, v in analysis.at_tips()
         if v.f.max(initial=0.0) > 0.0
     ]
@@ -122,9 +126,9 @@ def _any_ready(analysis: Analysis) -> bool:
 
 def _upper(g: Crack) -> float:
     """Largest f at which nodes of a crack may be released."""
-    upper = 1.0 + g.criterion.tolerance
-    if g.unstable_tolerance is not None and g.n_released:
-        upper = max(upper, 1.0 + g.unstable_tolerance)
+    upper, unstable = g.criterion.release_range[1], g.criterion.unstable_tolerance
+    if unstable is not None and g.n_released:
+        upper = max(upper, 1.0 + unstable)
     return upper
 
 
@@ -146,7 +150,7 @@ def _met_at_start(analysis: Analysis) -> list[bool]:
     could not make it smaller.
     """
     return [
-        not isinstance(g.criterion, RateCriterion)
+        g.criterion.smallest_increment_when_met
         and bool(v.f.max(initial=0.0) >= g.criterion.release_range[0])
         for g, v in analysis.at_tips()
     ]
@@ -183,7 +187,7 @@ def _is_neutral(
 def _may_run_on(analysis: Analysis) -> bool:
     """Whether more nodes may go at this load: within the unstable growth tolerance."""
     over = [
-        (float(v.f.max(initial=0.0)), g.unstable_tolerance)
+        (float(v.f.max(initial=0.0)), g.criterion.unstable_tolerance)
         for g, v in analysis.at_tips()
         if v.f.max(initial=0.0) >= g.criterion.release_range[0]
     ]

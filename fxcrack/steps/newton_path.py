@@ -59,9 +59,7 @@ class NewtonLoadPath:
         self._maximum = step.maximum
         self._record = record
         solver.exact = any(
-            getattr(c, "method", "") == "closure"
-            for g in analysis.active
-            for c in (g.debond.criterion, *g.debond.watch)
+            c.needs_exact_S for g in analysis.active for c in (g.debond.criterion, *g.debond.watch)
         )
 
     def to_crossing(self, target: float, *, upward: bool) -> bool:
@@ -250,7 +248,7 @@ class NewtonLoadPath:
         """Time between the present one and one at which f was beyond 1, near f = 1."""
         far, level = beyond
         present = self._analysis.largest
-        degree = max(g.evaluator.degree for g in self._analysis.active)
+        degree = max(g.degree for g in self._analysis.active)
         a, b = present ** (1.0 / degree) - 1.0, level ** (1.0 / degree) - 1.0
         secant = self._analysis.time - a * (far - self._analysis.time) / (b - a)
         low, high = sorted((self._analysis.time, far))

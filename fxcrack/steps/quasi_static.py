@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.errors import InputError, unknown_name
-from fxcrack.criteria import CrackLengthVsTime, RampRelease
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.analysis import Analysis
@@ -53,20 +52,18 @@ def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
 def _check_releases(analysis: Analysis, step: Static) -> None:
     """Refuse releases over increments where the stepping has none."""
     for g in analysis.active:
-        law = g.debond.release
-        counted = isinstance(law, RampRelease) and law.increments
-        if counted and step.stepping != "increment":
+        viscosity, law = g.criterion.viscosity, g.debond.release
+        over_increments = law.driver == "increments"
+        if over_increments and step.stepping != "increment":
             raise InputError(
-                f"interface '{g.title}' is released over {counted} increments, which "
+                f"interface '{g.title}' is released by {law} over increments, which "
                 f"stepping='{step.stepping}' does not have; use stepping='increment', "
                 "or a ramp with the opening (no number of increments)"
             )
-        viscosity = getattr(g.criterion, "viscosity", 0.0)
-        if viscosity > 0.0 and counted:
+        if viscosity > 0.0 and over_increments:
             raise InputError(
                 f"interface '{g.title}': viscosity delays a release at once or with the "
-                f"opening, not one over {counted} increments; use viscosity=0 or "
-                "another release"
+                f"opening, not {law} over increments; use viscosity=0 or another release"
             )
         if viscosity > 0.0 and step.stepping != "increment":
             raise InputError(
@@ -195,7 +192,7 @@ def _only_round_off(driver: StepDriver) -> bool:
     analysis = driver.analysis
     if driver.breaks or analysis.solver.system.soft.bonds or analysis.time <= 0.0:
         return False
-    by_load = not any(isinstance(g.criterion, CrackLengthVsTime) for g in analysis.active)
+    by_load = all(g.criterion.depends_on_load for g in analysis.active)
     released = any(g.n_released for g in analysis.active)
     return by_load and released and analysis.largest < 1e-8
 
@@ -203,7 +200,7 @@ def _only_round_off(driver: StepDriver) -> bool:
 def _next_guess(analysis: Analysis) -> float:
     """A time a little after the one at which f would reach 1 under a proportional load."""
     found = [
-        v.f.max(initial=0.0) ** (1.0 / g.evaluator.degree)
+        v.f.max(initial=0.0) ** (1.0 / g.degree)
         for g, v in analysis.at_tips()
         if v.f.max(initial=0.0) > 0.0
     ]
@@ -214,9 +211,7 @@ def _next_guess(analysis: Analysis) -> float:
 
 def _curves_have_ended(driver: StepDriver) -> bool:
     """Whether growth follows curves of time alone, which end before the step does."""
-    ends = [
-        getattr(g.evaluator, "ends", np.inf) for g, v in driver.analysis.at_tips() if len(v.tips)
-    ]
+    ends = [g.evaluator.ends for g, v in driver.analysis.at_tips() if len(v.tips)]
     if not ends or max(ends) > driver.analysis.time:
         return False
     return driver.end_time >= LARGE and not driver.breaks_ahead()

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fxcrack.base.arrays import Ints
-from fxcrack.criteria import StepRelease
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
@@ -64,7 +63,7 @@ def release_tips(
 def _open(analysis: Analysis, g: Crack, nodes: Ints, values: TipValues) -> None:
     """Open nodes by the release law of their debond: at once, cohesive, or along a ramp."""
     solver, time = analysis.solver, analysis.time
-    law, viscosity = g.debond.release, getattr(g.criterion, "viscosity", 0.0)
+    law, viscosity = g.debond.release, g.criterion.viscosity
     ramp: PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
     if g.opening_driven:
         units = g.to_soften(nodes, values)
@@ -72,7 +71,7 @@ def _open(analysis: Analysis, g: Crack, nodes: Ints, values: TipValues) -> None:
             solver.soften(g.p, units)
             return
         ramp = ViscousCohesiveRamp.begin(solver, g.p, units, viscosity, time)
-    elif not isinstance(law, StepRelease):
+    elif law.driver != "once":
         now = time if law.driver == "time" else float(analysis.balance.increment)
         ramp = PrescribedRamp.begin(solver, g.p, nodes, law, now)
     elif viscosity > 0.0:
