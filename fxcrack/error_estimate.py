@@ -176,7 +176,7 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
     try:
         twin = scene.rebuilt(order=3 - order)
         try:
-            short = _to_onset(step, linear=analysis.solver.linear)
+            short = _to_onset(step, linear=analysis.linear)
             twin.run(short, grow=grow, progress=False)
             theirs, _, other = _first(twin.analysis.history, grow, cycles=cycles)
             size = _size(twin.analysis, name)

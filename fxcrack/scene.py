@@ -332,7 +332,7 @@ class Scene:
                 "Dynamic moves bodies that have inertia, and the scene has none; write "
                 "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
             )
-        if isinstance(step, Cycles) and not self.solver.linear:
+        if isinstance(step, Cycles) and not self.analysis.linear:
             raise InputError(
                 "fatigue steps need linear bodies, but this scene takes the nonlinear solver "
                 f"({'; '.join(why)}); leave that effect out, or run Static steps"

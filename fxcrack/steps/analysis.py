@@ -131,6 +131,11 @@ class Analysis:
         return self.solver.pairs
 
     @property
+    def linear(self) -> bool:
+        """Whether the bodies are linear, and tips fixed by the bonds alone."""
+        return self.plan.solver == "linear"
+
+    @property
     def time(self) -> float:
         """Present time."""
         return self.balance.time
@@ -235,8 +240,7 @@ class Analysis:
         """What the criteria say in a state with the present bonds, one entry per active crack."""
         # normals and lengths at a front follow bodies that move far: their tips are made anew
         return [
-            g.evaluate(v.tips if self.solver.linear else g.tips(), state, time)
-            for g, v in self.at_tips()
+            g.evaluate(v.tips if self.linear else g.tips(), state, time) for g, v in self.at_tips()
         ]
 
     def evaluate_tips(self) -> None:
