@@ -127,7 +127,7 @@ def test_one_static_solve_starts_the_same_curve() -> None:
 # -- the report ----------------------------------------------------------------------
 
 
-@pytest.mark.quick("dcb2d")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("problem", [COARSE, COARSE_3D], ids=lambda p: p.name)
 def test_result_has_all_that_is_promised(problem: Problem) -> None:

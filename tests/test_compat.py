@@ -58,6 +58,7 @@ def build(comm: MPI.Comm, name: str, degree: int) -> tuple[dolfinx.mesh.Mesh, Ar
     return compat.create_mesh(comm, part, points, element), (cells, x)
 
 
+@pytest.mark.quick("triangle-1", "tetrahedron-2")
 @pytest.mark.mpi
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", CELLS)
@@ -104,6 +105,7 @@ def test_branching_facets_are_refused_where_unknown(comm: MPI.Comm) -> None:
             compat.create_mesh(comm, cells, x, element, max_facet_to_cell_links=3)
 
 
+@pytest.mark.quick("triangle-1", "tetrahedron-2")
 @pytest.mark.mpi
 @pytest.mark.parametrize("degree", [1, 2])
 @pytest.mark.parametrize("name", CELLS)

@@ -224,6 +224,7 @@ def test_soft_structure_is_no_mechanism(comm: MPI.Intracomm) -> None:
     soft.close()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_workspace_grows_until_it_is_enough(
     comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch

@@ -122,6 +122,7 @@ def test_block_cg_says_why_it_stopped(comm: MPI.Intracomm) -> None:
     indefinite.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_multigrid_is_symmetric_and_needs_few_cycles(comm: MPI.Intracomm) -> None:
     """A cube on springs; and without them its rigid motions are found on the coarsest level."""
@@ -170,7 +171,7 @@ def solved(mesh: Mesh, options: fx.CondensedOptions, **more: Any) -> tuple[Array
     return out
 
 
-@pytest.mark.quick("2-D-0.001", "3-D-0.001")
+@pytest.mark.quick("2-D-0.001")
 @pytest.mark.mpi
 @pytest.mark.parametrize("rtol", [1e-3, 1e-6])
 @pytest.mark.parametrize("name", MESHES)

@@ -94,8 +94,8 @@ def grown(comm: MPI.Intracomm, model: str, criterion: Any) -> fx.Scene:
 LOADS = {"plane": 0.15, "axisymmetric": 0.1, "3-D": 0.15}
 
 
+@pytest.mark.quick("plane-VCCT", "plane-fatigue", "axisymmetric-critical stress", "3-D-VCCT")
 @pytest.mark.three
-@pytest.mark.quick("plane-*", "*-VCCT")
 @pytest.mark.mpi
 @pytest.mark.parametrize("criterion", CRITERIA)
 @pytest.mark.parametrize("model", MODELS)

@@ -186,7 +186,7 @@ def test_penny_shaped_crack_starts_at_sneddons_load(quantity: str) -> None:
 # --- the criteria beside each other ---------------------------------------------------------------
 
 
-@pytest.mark.quick("1")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 def test_circle_of_three_criteria(order: int) -> None:
@@ -328,6 +328,7 @@ def test_moving_along_with_the_body_changes_no_length() -> None:
         assert t == pytest.approx(criterion.time_of(abs(x)), rel=5e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_reference_point_and_tip_that_move_are_followed() -> None:
     """Arms turned by a tenth: the way from the pin to the tip is that of their displacements."""
@@ -388,7 +389,7 @@ def test_curve_that_ends_ends_the_growth() -> None:
 
 
 def test_ways_on_a_line_and_where_tips_come_from() -> None:
-    front = plate(fx.CriticalStress(1.0, distance=0.1), order=2).model.fronts[0]
+    front = plate(fx.CriticalStress(1.0, distance=0.1), order=2).solver.fronts[0]
     paths = SurfacePaths(front)
     for _ in range(2):  # the tip at x = 1 goes on to 1.2, by a corner and the midside ahead of it
         tips = front.tips()

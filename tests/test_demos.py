@@ -64,6 +64,7 @@ def test_enf_is_close_to_beam_theory_and_does_not_penetrate():
     assert gap.min() > -1e-10 * np.abs(scene.solver.state.jump).max()
 
 
+@pytest.mark.quick("42.0")
 @pytest.mark.parametrize("lever", mmb.LEVERS)
 def test_mmb_is_close_to_the_standard(lever):
     scene, rows = mmb.run(lever)

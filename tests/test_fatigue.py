@@ -76,6 +76,7 @@ def test_n_of_a_is_the_integral_of_the_paris_law_over_the_static_rate():
     np.testing.assert_allclose(found.cycles(at), beam, rtol=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.verification
 def test_vcct_sums_the_rate_at_the_beginning_of_each_element():
     static = fatigue_dcb.static_rate(0.1, 8)

@@ -46,6 +46,7 @@ def sampled(scene: fx.Scene, corners: list[np.ndarray], n: int = 101) -> tuple[f
     return max(found), min(found)
 
 
+@pytest.mark.quick("0.1", "-1.0")
 @pytest.mark.parametrize("ratio", [0.5, 0.1, 0.0, -0.4, -1.0])
 def test_end_notched_flexure_with_contact_equals_its_sampled_cycle(ratio):
     mesh = enf_2d(half_span=50.0, height=2.25, dx=1.0, ny=2)
@@ -239,6 +240,7 @@ def test_cycles_beside_bonds_that_soften():
 # --- other models, several ranks ------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_axisymmetric_rates_are_those_of_static_growth(comm):
     def make(criterion: Any) -> fx.Scene:

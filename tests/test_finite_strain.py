@@ -207,6 +207,7 @@ def test_a_block_slides_over_many_facets(comm: MPI.Intracomm) -> None:
     assert np.abs(history["R[slide.x]"][loaded]).max() < 0.05
 
 
+@pytest.mark.slow
 def test_rate_of_a_peeled_film_does_not_depend_on_which_face_is_the_slave():
     # the film's face is stretched by 2 % at the root, the other one not at all
     def rate(slave: str, master: str) -> float:

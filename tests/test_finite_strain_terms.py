@@ -53,7 +53,7 @@ CASES = [
 ]  # fmt: skip
 
 
-@pytest.mark.quick("plane *", "solid-1-NeoHookean")
+@pytest.mark.quick("plane *-1-*")
 @pytest.mark.parametrize(("model", "order", "material"), CASES)
 def test_taylor(comm: MPI.Intracomm, model: str, order: int, material: Material) -> None:
     """Residual and tangent are first and second derivatives of the energy."""
@@ -151,6 +151,7 @@ def test_uniaxial_neo_hookean(comm: MPI.Intracomm, stretch: float) -> None:
     bodies.destroy()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_uniaxial_svk_in_plane_stress(comm: MPI.Intracomm) -> None:
     """S = E e along the bar: the nominal stress is l E (l^2 - 1)/2, the sides are free."""
@@ -228,7 +229,7 @@ def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> Non
     assert results[0] == pytest.approx(results[1], rel=1e-12)  # sums in another order
 
 
-@pytest.mark.quick("plane *")
+@pytest.mark.quick("plane stress")
 @pytest.mark.parametrize("model", MODELS)
 def test_stress_is_that_of_small_strain_when_small(comm: MPI.Intracomm, model: str) -> None:
     for material in (CARBON, fx.NeoHookean(E, NU)):

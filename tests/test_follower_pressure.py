@@ -37,7 +37,7 @@ def pressed(
     return continuum, WeakForm(continuum, [FollowerPressure(continuum, load)])
 
 
-@pytest.mark.quick("plane *", "solid-1")
+@pytest.mark.quick("plane *")
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("model", MODELS)
 def test_taylor(comm: MPI.Intracomm, model: str, order: int) -> None:

@@ -201,6 +201,7 @@ def test_the_nonlinear_path_gives_the_same(comm: MPI.Intracomm) -> None:
         assert last[1] == pytest.approx(last[0], rel=1e-8)  # asked for by the issue
 
 
+@pytest.mark.slow
 def test_slips_are_committed_in_the_jumps_of_a_renewed_pairing() -> None:
     scene = pulled(MPI.COMM_SELF, 2, effects=[fx.FiniteStrain()])
     model, renewals, renew = scene.solver, [], scene.solver.renew_pairs  # type: ignore[attr-defined]
@@ -368,6 +369,7 @@ def onset_load(scene: fx.Scene) -> float:
     return -float(history.at("a[bond]", 35.0, event="onset")["R[load.y]"])
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_friction_raises_the_load_of_an_enf_specimen_as_beams_say(comm: MPI.Intracomm) -> None:
     smooth = onset_load(enf(comm, None))
@@ -382,6 +384,7 @@ def test_friction_raises_the_load_of_an_enf_specimen_as_beams_say(comm: MPI.Intr
 FORTH_AND_BACK = fx.Amplitude((0.0, 1.0, 2.0, 3.0, 4.0), (0.0, 1.0, 0.3, 1.36, 0.4))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_crack_that_grows_and_is_unloaded_keeps_its_energy(comm: MPI.Intracomm) -> None:
     step = fx.Static(until=fx.Time(4.0))
@@ -404,7 +407,7 @@ def test_increments_come_to_the_same_end(comm: MPI.Intracomm) -> None:
         assert ends[1][name] == pytest.approx(ends[0][name], rel=1e-9)
 
 
-@pytest.mark.quick("3")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("rows", [3, 9])
 def test_a_restart_goes_on_as_if_nothing_had_been(

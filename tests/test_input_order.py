@@ -41,8 +41,8 @@ class Body:
         return [(c.positions(), c.space), (np.asarray(there), self.cells)]
 
 
+@pytest.mark.quick("*-1-1")
 @pytest.mark.three
-@pytest.mark.quick("*-1-*", "solid-0-2")
 @pytest.mark.parametrize(("model", "simplex", "order"), KINDS)
 def test_one_rank_and_all_ranks_write_and_read_the_same(
     model: str, simplex: bool, order: int, comm: MPI.Intracomm

@@ -66,7 +66,7 @@ def coordinates(
     pairs = [make_pair(continuum, i) for i in interfaces]
     roles = [np.full((p.surface.n_nodes, mesh.gdim), RETAINED, dtype=np.int8) for p in pairs]
     columns = collect_supports(continuum, list(supports))
-    found = build_coordinates(continuum, pairs, roles, columns, 0)
+    found = build_coordinates(continuum.layout, pairs, roles, columns, 0)
     transform = gathered(found.transform).toarray()
     found.transform.destroy()
     return pairs, found, transform

@@ -88,7 +88,7 @@ def tie(**options: object) -> fx.Interface:
     )
 
 
-@pytest.mark.quick("*-1-*")
+@pytest.mark.quick("quadrilateral-1-*", "tetrahedron-1-shear")
 @pytest.mark.parametrize(
     ("cell", "order", "load"),
     [

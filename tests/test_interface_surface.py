@@ -54,6 +54,7 @@ def continuum(mesh: Mesh, order: int | None = None) -> Continuum:
     return Continuum(mesh, fx.Isotropic(1.0, 0.3), model, order=order)
 
 
+@pytest.mark.quick("*-1")
 @pytest.mark.three
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), CASES)

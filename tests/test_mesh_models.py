@@ -63,6 +63,7 @@ def test_dcb_2d(cell: str, order: int) -> None:
     assert_same_on_ghosts(mesh)
 
 
+@pytest.mark.quick("hexahedron-1")
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), CASES_3D)
 def test_dcb_3d(comm: MPI.Comm, cell: str, order: int) -> None:

@@ -161,7 +161,7 @@ def check_box(mesh: Mesh, cell: str, order: int) -> None:
     assert_same_on_ghosts(mesh)
 
 
-@pytest.mark.quick("*-1")
+@pytest.mark.quick("triangle-1", "hexahedron-1")
 @pytest.mark.three
 @pytest.mark.mpi
 @pytest.mark.parametrize(("cell", "order"), CASES)

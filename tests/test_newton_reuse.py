@@ -57,7 +57,7 @@ def test_same_history_with_fewer_tangents(comm: MPI.Intracomm) -> None:
     assert made[0] < 0.8 * made[1], made
 
 
-@pytest.mark.quick("event-release0", "path-release2")
+@pytest.mark.quick("event-release0")
 @pytest.mark.parametrize(
     ("stepping", "release"),
     [
@@ -99,6 +99,7 @@ def test_rates_by_exact_closure_are_those_of_the_state() -> None:
         assert a["time"] == pytest.approx(b["time"], rel=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_trial_that_is_forgotten_leaves_the_tangent_as_it_was(comm: MPI.Intracomm) -> None:
     scene = peel(comm, reuse=True)
@@ -236,7 +237,7 @@ def closing(balance: float = 1e-5, **step: Any) -> fx.History:
     return scene.run(fx.Static(until=fx.Time(3.0), **step))
 
 
-@pytest.mark.quick("increments")
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "step",
     [

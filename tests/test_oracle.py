@@ -313,7 +313,7 @@ def run(name: str, comm: MPI.Intracomm) -> fx.Scene:
     return scene
 
 
-@pytest.mark.quick("chain", "bending_with_contact", "solid")
+@pytest.mark.quick("chain", "bending_with_contact")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", SCENES)
 def test_state_is_that_of_the_whole_problem(comm: MPI.Intracomm, name: str) -> None:
@@ -346,7 +346,7 @@ def test_state_is_that_of_the_whole_problem(comm: MPI.Intracomm, name: str) -> N
     scene.close()
 
 
-@pytest.mark.quick("chain", "bending_with_contact", "solid")
+@pytest.mark.quick("chain", "bending_with_contact")
 @pytest.mark.mpi
 @pytest.mark.parametrize("name", SCENES)
 def test_transformed_matrix_with_its_borders(comm: MPI.Intracomm, name: str) -> None:

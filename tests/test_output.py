@@ -105,7 +105,7 @@ def read_bodies(pvd: Path) -> list[tuple[float, list[dict[str, Any]]]]:
 # -- what the fields hold --------------------------------------------------------------------------
 
 
-@pytest.mark.quick("2d", "3d")
+@pytest.mark.quick("2d")
 @pytest.mark.mpi
 @pytest.mark.parametrize("kind", MESHES)
 def test_jumps_and_tractions_agree_with_the_window(kind: str) -> None:
@@ -317,7 +317,7 @@ def test_files_hold_the_fields(kind: str, comm: MPI.Comm, shared_path: Path) -> 
     scene.close()
 
 
-@pytest.mark.quick("model0")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("model", [fx.PlaneStress(), fx.PlaneStrain()])
 def test_uniform_tension_is_found_in_the_file(
@@ -348,6 +348,7 @@ def test_uniform_tension_is_found_in_the_file(
     scene.close()
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_series_as_an_observer(comm: MPI.Comm, shared_path: Path) -> None:
     scene = cracked()

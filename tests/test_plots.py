@@ -228,6 +228,7 @@ def test_front_advance_needs_a_surface() -> None:
 # -- deformed mesh ---------------------------------------------------------------------------------
 
 
+@pytest.mark.quick("1")
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 def test_shape_of_a_plane_body_is_its_cells(comm: MPI.Comm, order: int) -> None:

@@ -98,6 +98,7 @@ def test_saw_tooth_is_at_least_five_times_smaller_than_that_of_step_release():
     assert amplitude["progressive"] < amplitude["step"] / 5.0
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_rebases_while_bonds_soften_change_nothing(comm):
     histories, solves = [], []
@@ -116,6 +117,7 @@ def test_rebases_while_bonds_soften_change_nothing(comm):
         np.testing.assert_allclose(one[column], other[column], rtol=1e-8, atol=1e-12)
 
 
+@pytest.mark.quick("0.2")
 @pytest.mark.mpi
 @pytest.mark.parametrize("propagation", [0.2, 0.12])
 def test_enhanced_vcct_dissipates_the_propagation_toughness(comm, propagation):

@@ -30,7 +30,7 @@ CRITERIA = {
 }
 
 
-@pytest.mark.quick("*-1")
+@pytest.mark.quick("stress-1")
 @pytest.mark.mpi
 @pytest.mark.parametrize("order", [1, 2])
 @pytest.mark.parametrize("name", CRITERIA)
@@ -124,6 +124,7 @@ def test_steps_in_sequence_and_pairs_that_stay_tied() -> None:
     assert_balanced(history)
 
 
+@pytest.mark.slow
 def test_order_of_steps_does_not_matter_where_nothing_grows() -> None:
     at_once = two_cracks.make_scene(dx=1.0, n_upper=4)
     in_parts = two_cracks.make_scene(dx=1.0, n_upper=4)
@@ -136,6 +137,7 @@ def test_order_of_steps_does_not_matter_where_nothing_grows() -> None:
         assert times[1] == pytest.approx(times[0], rel=1e-8)  # other windows, another factor
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_two_pairs_with_a_criterion_each() -> None:
     scene = two_cracks.make_scene(dx=1.0, n_upper=4)
@@ -198,7 +200,7 @@ def test_force_follows_the_amplitude_through_steps() -> None:
     assert history["released_energy"][-1] > 0.0
 
 
-@pytest.mark.quick("None")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("rows", [None, 0.1])
 def test_release_in_progress_survives_steps_and_new_windows(rows: float | None) -> None:
@@ -238,6 +240,7 @@ def test_first_increment_after_debonding() -> None:
             assert 0.9 <= a["f[bond]"] <= 1.1 + 1e-12
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", CRITERIA)
 def test_increments_end_near_what_events_find(name: str) -> None:
     exact, marched = plate(CRITERIA[name]), plate(CRITERIA[name])

@@ -579,6 +579,7 @@ def pressed_specimen(comm: MPI.Intracomm, **options: object) -> fx.Scene:
     )
 
 
+@pytest.mark.quick("DCB", "3-D")
 @pytest.mark.parametrize("name", ["DCB", "second order", "3-D", "ring", "contact", "pressed"])
 def test_closure_is_the_energy_released(name: str) -> None:
     """G times the area of a unit is the energy its bond forces give up on their way to zero."""

@@ -31,6 +31,7 @@ def heated_dcb(comm: MPI.Intracomm, path: str | None) -> fx.Scene:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_toughness_follows_the_temperature_of_the_bodies(comm: MPI.Intracomm) -> None:
     scene = heated_dcb(comm, None)

@@ -71,7 +71,7 @@ def made(continuum: Continuum, kind: str) -> WeakForm:
     return WeakForm(continuum, [Elastic(continuum, finite=kind == "finite")])
 
 
-@pytest.mark.quick("plane stress-*", "ring-neo")
+@pytest.mark.quick("plane stress-*")
 @pytest.mark.parametrize(
     ("model", "kind"), [(m, k) for m in HELD for k in KINDS if (m, k) != ("plane stress", "neo")]
 )
@@ -141,6 +141,7 @@ def test_clamped_stress(comm: MPI.Intracomm) -> None:
         assert stress == pytest.approx(np.tile(expected, (len(stress), 1)), abs=1e-13 * E)
 
 
+@pytest.mark.slow
 def test_plane_strain_out_of_plane(comm: MPI.Intracomm) -> None:
     """Free in the plane, held across: strain (1 + nu) A T in the plane, stress -E A T across."""
     continuum = heated(comm, "plane strain", STEEL, fx.Temperature(40.0))
@@ -196,7 +197,7 @@ def test_loads_of_the_linear_path(comm: MPI.Intracomm, model: str) -> None:
     bodies.destroy()
 
 
-@pytest.mark.quick("linear", "neo")
+@pytest.mark.quick("linear")
 @pytest.mark.parametrize("kind", KINDS)
 def test_taylor(comm: MPI.Intracomm, kind: str) -> None:
     material = fx.NeoHookean(E, NU, expansion=0.1) if kind == "neo" else CARBON
@@ -218,7 +219,7 @@ def test_taylor(comm: MPI.Intracomm, kind: str) -> None:
         bodies.destroy()
 
 
-@pytest.mark.quick("linear")
+@pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.verification
 @pytest.mark.parametrize("path", ["linear", "finite"])
@@ -340,6 +341,7 @@ def test_large_strain_heating_balances(comm: MPI.Intracomm) -> None:
     assert np.log2(errors[0] / errors[1]) > 1.8 and errors[1] < 1e-2, errors
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_a_dolfinx_function_is_a_temperature(comm: MPI.Intracomm) -> None:
     mesh = box(comm, "plane strain")
@@ -362,6 +364,7 @@ def test_a_dolfinx_function_is_a_temperature(comm: MPI.Intracomm) -> None:
         Continuum(other, STEEL, fx.PlaneStrain(), temperature=fx.Temperature(given))
 
 
+@pytest.mark.slow
 @pytest.mark.mpi
 def test_forces_do_not_depend_on_the_number_of_ranks(comm: MPI.Intracomm) -> None:
     results = []

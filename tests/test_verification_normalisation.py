@@ -39,15 +39,15 @@ def rates(x: Array) -> tuple[Array, dict[str, Array]]:
         if length > LAST:
             break
         lengths.append(length)
-        force = bond_forces(model, 0, tips, model.state)
-        opening = openings(model, 0, tips, model.state)
+        force = bond_forces(growth.probe, tips, model.state)
+        opening = openings(growth.probe, tips, model.state)
         scale = 1.0 / model.state.loads[1] ** 2
         for name in NORMALISATIONS:
             g = energy_release_rates(
                 force, opening, tips.d_ahead, tips.d_behind, tips.width, normalisation=name
             )
             found[name].append(scale * g[0, 0])
-        jumps = closure_jumps(model, 0, tips, force)
+        jumps = closure_jumps(growth.probe, tips, force)
         found["closure"].append(scale * closure_rates(force, jumps, tips.area)[0, 0])
         model.release(0, tips.node, np.zeros(model.system.n_retained))
     return np.array(lengths), {name: np.array(g) for name, g in found.items()}

@@ -78,7 +78,7 @@ class Matrices:
             cap_mb=_UNLIMITED_MB, gdim=self.gdim,
         )  # fmt: skip
         self.coordinates: JumpCoordinates = build_coordinates(
-            continuum, scene.pairs, roles, scene.supports, 0
+            continuum.layout, scene.pairs, roles, scene.supports, 0
         )
         stiffness = continuum.stiffness()
         self.matrix: PETSc.Mat = stiffness.ptap(self.coordinates.transform)

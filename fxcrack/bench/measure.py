@@ -172,7 +172,7 @@ def solve_once(problem: Problem, mesh: Mesh, *, compare: bool = True) -> dict[st
     (pair,) = scene.pairs
     bonded = np.repeat(pair.bonded[:, None], mesh.gdim, axis=1)
     role = np.where(bonded, FIXED, FREE).astype(np.int8)
-    coordinates = build_coordinates(scene.continuum, scene.pairs, [role], scene.supports, 0)
+    coordinates = build_coordinates(scene.continuum.layout, scene.pairs, [role], scene.supports, 0)
     matrix = stiffness.ptap(coordinates.transform)
     stiffness.destroy()
     clock.append(time.perf_counter())

@@ -47,14 +47,14 @@ def load_and_monitor_vectors(
         count = continuum.comm.allreduce(len(nodes))
         vector = PETSc.Vec().createMPI((continuum.n_local, continuum.n_global), comm=continuum.comm)
         for i, component in enumerate(monitor.direction):
-            vector.array[continuum.gdim * nodes + i] = component / count
+            vector.array[continuum.layout.dof(nodes, i)] = component / count
         out.append(vector)
     for mine in followed:
         count = continuum.comm.allreduce(len(mine))
         for i in range(continuum.gdim):
             size = (continuum.n_local, continuum.n_global)
             vector = PETSc.Vec().createMPI(size, comm=continuum.comm)
-            vector.array[continuum.gdim * mine + i] = 1.0 / count
+            vector.array[continuum.layout.dof(mine, i)] = 1.0 / count
             out.append(vector)
     return out
 

@@ -169,7 +169,7 @@ class SchurColumnCache:
                 for r, m in zip(roles, may_open, strict=True)
             ]
             coordinates = build_coordinates(
-                self._continuum, self._pairs, self._roles, self._supports, len(borders)
+                self._continuum.layout, self._pairs, self._roles, self._supports, len(borders)
             )
             timings.add("transform", start)
             start = time.perf_counter()

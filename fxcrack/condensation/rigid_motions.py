@@ -19,22 +19,24 @@ from fxcrack.interface.supports import Supports
 
 def rigid_motions(continuum: Continuum) -> Array:
     """Rigid motions on the owned dofs, scaled to unit length, shape (n_local, n_motions)."""
-    gdim = continuum.gdim
-    x = continuum.positions()[: continuum.n_local // gdim, :gdim]
+    gdim, layout = continuum.gdim, continuum.layout
+    x = continuum.positions()[: layout.n_owned, :gdim]
     low = continuum.comm.allreduce(x.min(axis=0, initial=np.inf), op=_least)
     high = continuum.comm.allreduce(x.max(axis=0, initial=-np.inf), op=_most)
-    s = (x - 0.5 * (low + high)) / max(float((high - low).max()), 1e-300)
-    motions = []
+    size = max(float((high - low).max()), 1e-300)
+    s = (x - 0.5 * (low + high)) / size
+    motions, still = [], np.zeros(3)
     if isinstance(continuum.model, Axisymmetric):
-        motions.append(np.tile([0.0, 1.0], (len(s), 1)))
+        motions.append(layout.rigid_motion(np.tile([0.0, 1.0], (len(s), 1)), still))
     else:
-        motions += [np.tile(row, (len(s), 1)) for row in np.eye(gdim)]
+        motions += [layout.rigid_motion(np.tile(e, (len(s), 1)), still) for e in np.eye(gdim)]
         planes = [(0, 1)] if gdim == 2 else [(0, 1), (1, 2), (0, 2)]
         for i, j in planes:
             turn = np.zeros((len(s), gdim))
             turn[:, i], turn[:, j] = -s[:, j], s[:, i]
-            motions.append(turn)
-    return np.stack([m.ravel() for m in motions], axis=1)
+            axis = np.cross(np.eye(3)[i], np.eye(3)[j])
+            motions.append(layout.rigid_motion(turn, axis / size))
+    return np.stack(motions, axis=1)
 
 
 def check_held(continuum: Continuum, supports: Supports) -> None:

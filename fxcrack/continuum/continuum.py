@@ -24,6 +24,7 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.kinematics import Axisymmetric, Model
 from fxcrack.continuum.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
 from fxcrack.continuum.materials import Material
@@ -48,6 +49,7 @@ class Continuum:
 
     Attributes:
         space: Displacement space.
+        layout: Unknowns of its nodes and their numbers.
         x: UFL position.
         weight: UFL factor of area and volume elements (thickness, ring, 1).
         degree: Quadrature degree of all integrals.
@@ -92,10 +94,8 @@ class Continuum:
         self.comm = mesh.comm
         self.gdim = mesh.gdim
         self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (self.gdim,)))
-        index_map = self.space.dofmap.index_map
-        self.n_local = int(index_map.size_local) * self.gdim
-        self.n_global = int(index_map.size_global) * self.gdim
-        self.offset = int(index_map.local_range[0]) * self.gdim
+        n_owned = int(self.space.dofmap.index_map.size_local)
+        self.layout = DofLayout(self.comm, self.gdim, n_owned)
         self.x = ufl.SpatialCoordinate(mesh.domain)
         weight = model.weight(self.x)
         self.weight = (
@@ -120,6 +120,21 @@ class Continuum:
         self.part_cells: list[Ints] = []
         self.parts = self._assign(materials)
         self._form: Any = None
+
+    @property
+    def n_local(self) -> int:
+        """Dofs that this rank owns."""
+        return self.layout.n_local
+
+    @property
+    def n_global(self) -> int:
+        """Dofs of all ranks."""
+        return self.layout.n_global
+
+    @property
+    def offset(self) -> int:
+        """First global dof of this rank."""
+        return self.layout.offset
 
     def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any, Any]]:
         """Stiffness, stress per strain and measure, one triple per material."""
@@ -273,7 +288,7 @@ class Continuum:
         count = self.comm.allreduce(len(nodes))
         vector = PETSc.Vec().createMPI((self.n_local, self.n_global), comm=self.comm)
         for i, component in enumerate(value):
-            vector.array[self.gdim * nodes + i] = component / count
+            vector.array[self.layout.dof(nodes, i)] = component / count
         return vector
 
     def owned_nodes(self, where: str) -> Ints:
@@ -285,7 +300,7 @@ class Continuum:
         group = self.mesh.group(where)
         self.mesh.domain.topology.create_connectivity(group.dim, self.mesh.tdim)
         nodes = fem.locate_dofs_topological(self.space, group.dim, group.entities)
-        nodes = np.unique(nodes[nodes < self.n_local // self.gdim])
+        nodes = np.unique(nodes[nodes < self.layout.n_owned])
         if self.comm.allreduce(len(nodes)) == 0:
             raise InputError(f"group '{where}' of mesh '{self.mesh.name}' holds no node")
         return np.asarray(nodes, dtype=np.int32)

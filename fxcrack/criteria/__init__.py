@@ -10,6 +10,7 @@ from fxcrack.criteria.crack_opening import CrackOpening
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.critical_stress import CriticalStress
 from fxcrack.criteria.energy_release import RateCriterion
+from fxcrack.criteria.evaluator import Evaluator, TipEvaluator
 from fxcrack.criteria.fatigue import CycleJump, Fatigue, Paris, Regime, cycle_jump
 from fxcrack.criteria.mixed_mode import BK, MixedMode, Power, Reeder, clip, total
 from fxcrack.criteria.release_laws import (
@@ -32,6 +33,7 @@ __all__ = [
     "CriticalStress",
     "CycleJump",
     "EnhancedVCCT",
+    "Evaluator",
     "Fatigue",
     "MixedMode",
     "Paris",
@@ -45,6 +47,7 @@ __all__ = [
     "ReleaseLaw",
     "StepRelease",
     "Tabulated",
+    "TipEvaluator",
     "clip",
     "closure_rates",
     "cycle_jump",

@@ -18,9 +18,9 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.criteria.evaluator import Evaluator
+from fxcrack.criteria.probe import FrontProbe
 from fxcrack.interface.surface_paths import SurfacePaths, Way, locate
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
 
 _ROUND_OFF = 1e-11
 """Tractions below this fraction of the largest one count as zero."""
@@ -57,22 +57,18 @@ class _AtDistance(Evaluator):
     """What both criteria share: ways along the surface and stencils kept for the present front.
 
     Args:
-        solver: Condensed model, with its front in the initial state.
-        p: Number of the pair.
+        probe: The interface, with its front in the initial state.
         distance: From the tip, length.
         temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
     """
 
     degree: ClassVar[float] = 1.0
 
-    def __init__(
-        self, solver: LinearSolver, p: int, distance: float, temperature: Array | None
-    ) -> None:
-        self.solver = solver
-        self.p = p
+    def __init__(self, probe: FrontProbe, distance: float, temperature: Array | None) -> None:
+        self.probe = probe
         self.distance = distance
         self.temperature = temperature
-        self.front = solver.fronts[p]
+        self.front = probe.front
         self.surface = self.front.surface
         self.paths = SurfacePaths(self.front)
         self._known: dict[tuple[int, int, bytes], Stencil] = {}
@@ -104,10 +100,10 @@ class _AtDistance(Evaluator):
 
     def where(self, node: int) -> str:
         """Interface and tip in words."""
-        x = self.surface.x[node, : self.solver.continuum.gdim]
+        x = self.surface.x[node, : self.probe.gdim]
         x = np.where(np.abs(x) < 1e-9 * self.paths.longest, 0.0, x)
         place = ", ".join(f"{c:.6g}" for c in x)
-        return f"interface '{self.solver.pairs[self.p].title}', tip at ({place})"
+        return f"interface '{self.probe.pair.title}', tip at ({place})"
 
 
 def _on_face(way: Way, points: Array, distance: float, order: int) -> tuple[Ints, Array]:

@@ -17,7 +17,6 @@ from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
-from mpi4py import MPI
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
@@ -25,11 +24,11 @@ from fxcrack.base.checks import not_negative, table
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.evaluator import Evaluator
+from fxcrack.criteria.interface_temperature import InterfaceTemperature
+from fxcrack.criteria.probe import FrontProbe, State
 from fxcrack.criteria.release_laws import Driver
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.surface_paths import Origins, SurfacePaths
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
@@ -73,6 +72,12 @@ class CrackLengthVsTime(Criterion):
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "lengths", lengths)
+
+    def evaluator(
+        self, probe: FrontProbe, temperature: InterfaceTemperature | None, *, softens: bool = False
+    ) -> LengthEvaluator:
+        """The criterion on one interface; arguments as for :meth:`Criterion.evaluator`."""
+        return LengthEvaluator(probe, self)
 
     def can_start(self, first_distance: npt.ArrayLike) -> Bools:
         """Whether the crack can ever start: not if the curve begins beyond the first bonded node.
@@ -152,25 +157,11 @@ _SAME_TIME = 1e-9
 """The curve begins, and f jumps up from 0, this fraction of the time before its first entry."""
 
 
-def mean_position(solver: LinearSolver, where: str) -> Array:
-    """Mean reference position of the nodes of a group, shape (3,), length; collective.
-
-    Raises:
-        InputError: The mesh has no such group, or it holds no node.
-    """
-    continuum = solver.continuum
-    nodes = continuum.owned_nodes(where)
-    total = np.append(continuum.positions()[nodes].sum(axis=0), len(nodes))
-    total = continuum.comm.allreduce(total, op=MPI.SUM)
-    return np.asarray(total[:3] / total[3])
-
-
 class LengthEvaluator(Evaluator):
     """Growth along a curve of crack length against total time; collective.
 
     Args:
-        solver: Condensed model, with its front in the initial state.
-        p: Number of the pair.
+        probe: The interface, with its front in the initial state.
         criterion: Curve and reference nodes.
 
     Attributes:
@@ -183,16 +174,16 @@ class LengthEvaluator(Evaluator):
 
     degree: ClassVar[float] = 1.0
 
-    def __init__(self, solver: LinearSolver, p: int, criterion: CrackLengthVsTime) -> None:
-        self.solver = solver
+    def __init__(self, probe: FrontProbe, criterion: CrackLengthVsTime) -> None:
+        self.probe = probe
         self.criterion = criterion
-        self.front = solver.fronts[p]
+        self.front = probe.front
         self.paths = SurfacePaths(self.front)
-        self.reference = mean_position(solver, criterion.reference)
+        self.reference = probe.mean_position(criterion.reference)
         self.ends = float(criterion.times[-1])
         self._known: tuple[int, int, bytes] | None = None
         self._origins: Origins
-        surface, initial = solver.pairs[p].surface, self.paths.initial  # undeformed
+        surface, initial = probe.pair.surface, self.paths.initial  # undeformed
         self._x = surface.x
         self._begin = np.zeros((surface.n_nodes, 3))
         self._grown = np.zeros(surface.n_nodes)
@@ -202,11 +193,8 @@ class LengthEvaluator(Evaluator):
         self._followed: list[int] = []
         self._slot = np.zeros(surface.n_nodes, dtype=np.int64)
         if criterion.moving and len(initial):
-            self._followed.append(solver.follow(solver.continuum.owned_nodes(criterion.reference)))
-            gdim, n_local = solver.continuum.gdim, solver.continuum.n_local
-            for block in surface.dofs[initial] - solver.continuum.offset // gdim:
-                here = np.array([block]) if 0 <= block < n_local // gdim else np.zeros(0, dtype=int)
-                self._followed.append(solver.follow(here))
+            self._followed.append(probe.follow(criterion.reference))
+            self._followed += [probe.follow(int(node)) for node in initial]
             self._slot[initial] = 1 + np.arange(len(initial))
         stuck = initial[~self._starts[initial]]
         if len(stuck):
@@ -215,11 +203,11 @@ class LengthEvaluator(Evaluator):
                 "interface '%s': the first tabulated crack length %g is larger than the distance "
                 "%g from reference '%s' to the first bonded node at (%s); %s of %d tips will "
                 "never propagate: let the curve begin with a smaller length",
-                solver.pairs[p].title,
+                probe.pair.title,
                 criterion.lengths[0],
                 first[i],
                 criterion.reference,
-                ", ".join(f"{c:.6g}" for c in surface.x[i, : solver.continuum.gdim]),
+                ", ".join(f"{c:.6g}" for c in surface.x[i, : probe.gdim]),
                 "all" if len(stuck) == len(initial) else str(len(stuck)),
                 len(initial),
             )
@@ -236,7 +224,7 @@ class LengthEvaluator(Evaluator):
             self._known = key
         return self._origins
 
-    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+    def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Length of the curve, 1 once it has begun, way of the origins from the reference point.
 
         Shape (n, 5); the way is that of their displacements alone.
@@ -249,7 +237,7 @@ class LengthEvaluator(Evaluator):
         out[:, 0] = max(self.criterion.length(time), self.criterion.lengths[0])
         out[:, 1] = time >= begin
         if self._followed:
-            motion = self.solver.motion(state)[self._followed]
+            motion = self.probe.motion(state)[self._followed]
             at_tips = motion[self._slot[origins.nodes]]
             way = np.einsum("nk,nkc->nc", origins.weights, at_tips) - motion[0]
             out[:, 2 : 2 + way.shape[1]] = way

@@ -21,11 +21,11 @@ from fxcrack.base.checks import not_negative, positive, table
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.at_distance import Stencil, _AtDistance, _on_face
 from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.interface_temperature import InterfaceTemperature, steady
+from fxcrack.criteria.probe import FrontProbe, State
 from fxcrack.criteria.release_laws import Driver
 from fxcrack.criteria.toughness import Tabulated
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
@@ -82,6 +82,12 @@ class CrackOpening(Criterion):
                 "interface so, or model both halves and leave symmetry out"
             )
 
+    def evaluator(
+        self, probe: FrontProbe, temperature: InterfaceTemperature | None, *, softens: bool = False
+    ) -> OpeningEvaluator:
+        """The criterion on one interface; arguments as for :meth:`Criterion.evaluator`."""
+        return OpeningEvaluator(probe, self, steady(temperature, probe, self))
+
     def critical_at(
         self, crack_length: npt.ArrayLike, temperature: npt.ArrayLike | None = None
     ) -> Array:
@@ -135,8 +141,7 @@ class OpeningEvaluator(_AtDistance):
     The critical value belongs to the length grown from the initial tip along the slave surface.
 
     Args:
-        solver: Condensed model, with its front in the initial state.
-        p: Number of the pair.
+        probe: The interface, with its front in the initial state.
         criterion: Critical openings and distance.
         temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
 
@@ -147,12 +152,11 @@ class OpeningEvaluator(_AtDistance):
 
     def __init__(
         self,
-        solver: LinearSolver,
-        p: int,
+        probe: FrontProbe,
         criterion: CrackOpening,
         temperature: Array | None = None,
     ) -> None:
-        super().__init__(solver, p, criterion.distance, temperature)
+        super().__init__(probe, criterion.distance, temperature)
         self.criterion = criterion
         criterion.critical_at(0.0, temperature)
         self.behind = criterion.distance + self.paths.longest
@@ -161,7 +165,7 @@ class OpeningEvaluator(_AtDistance):
         self._check_start()
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
-        paired = self.solver.pairs[self.p].paired
+        paired = self.probe.pair.paired
         way = self.paths.behind(tips, i, self.distance * (1.0 - 1e-12), paired)
         reach = float(way.radius.max())
         if self.distance > reach * (1.0 + 1e-12):
@@ -188,16 +192,16 @@ class OpeningEvaluator(_AtDistance):
             self._grown[tips.node] = self.paths.origins(tips).grown
         return super().stencil(tips)
 
-    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+    def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Opening, and length grown so far, shape (n, 2), length."""
         stencil = self.stencil(tips)
-        pair = self.solver.pairs[self.p]
-        jump = self.solver.vectors(self.p, stencil.nodes, state.jump)
+        pair = self.probe.pair
+        jump = self.probe.jumps(stencil.nodes, state)
         normal = np.zeros((*stencil.nodes.shape, 3))
         if self.front.placed:  # the arms turn to both sides of the normal at the tip
             normal[:] = tips.frame[:, None, :, 0]
         else:
-            normal[..., : self.solver.continuum.gdim] = pair.frames[stencil.nodes, :, 0]
+            normal[..., : self.probe.gdim] = pair.frames[stencil.nodes, :, 0]
         opening = np.einsum("nkc,nkc->nk", normal, jump) + pair.gap[stencil.nodes]
         return np.stack([stencil(opening), self._grown[tips.node]], axis=1)
 

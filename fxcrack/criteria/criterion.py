@@ -7,9 +7,13 @@ everything else has a default that a class attribute, a field or a property repl
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from typing import Protocol
 
 from fxcrack.base.errors import InputError
+from fxcrack.criteria.evaluator import Evaluator
+from fxcrack.criteria.interface_temperature import InterfaceTemperature
+from fxcrack.criteria.probe import FrontProbe
 from fxcrack.criteria.release_laws import Driver
 from fxcrack.criteria.toughness import Tabulated
 
@@ -24,6 +28,22 @@ class Criterion(Protocol):
     """
 
     tolerance: float = 0.1
+
+    @abstractmethod
+    def evaluator(
+        self, probe: FrontProbe, temperature: InterfaceTemperature | None, *, softens: bool = False
+    ) -> Evaluator:
+        """The criterion on one interface; collective.
+
+        Args:
+            probe: The interface, with its front in the initial state.
+            temperature: Temperature of its slave nodes; None where the debond gives none, and that
+                of the bodies is not asked for (:attr:`needs_temperature`) or does not exist.
+            softens: Whether bonds are released softening with their opening.
+
+        Raises:
+            InputError: The criterion does not fit the interface.
+        """
 
     @property
     def release_range(self) -> tuple[float, float]:

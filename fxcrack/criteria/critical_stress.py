@@ -19,11 +19,11 @@ from fxcrack.base.checks import not_negative, number, positive
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.at_distance import _ROUND_OFF, _AtDistance, _on_face
 from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.interface_temperature import InterfaceTemperature, steady
+from fxcrack.criteria.probe import FrontProbe, State
 from fxcrack.criteria.release_laws import Driver
 from fxcrack.criteria.toughness import Tabulated
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.linear import LinearSolver
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,12 @@ class CriticalStress(Criterion):
                 raise InputError(
                     f"{owner}: {name} = {value} must be positive; None or 0 for no effect"
                 )
+
+    def evaluator(
+        self, probe: FrontProbe, temperature: InterfaceTemperature | None, *, softens: bool = False
+    ) -> StressEvaluator:
+        """The criterion on one interface; arguments as for :meth:`Criterion.evaluator`."""
+        return StressEvaluator(probe, self, steady(temperature, probe, self))
 
     def strength(self, temperature: npt.ArrayLike | None = None) -> Array:
         """Strengths (normal, along growth, along the front), infinite where there is no effect.
@@ -115,8 +121,7 @@ class StressEvaluator(_AtDistance):
     near), the last of them counts.
 
     Args:
-        solver: Condensed model, with its front in the initial state.
-        p: Number of the pair.
+        probe: The interface, with its front in the initial state.
         criterion: Strengths and distance.
         temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
 
@@ -127,12 +132,11 @@ class StressEvaluator(_AtDistance):
 
     def __init__(
         self,
-        solver: LinearSolver,
-        p: int,
+        probe: FrontProbe,
         criterion: CriticalStress,
         temperature: Array | None = None,
     ) -> None:
-        super().__init__(solver, p, criterion.distance, temperature)
+        super().__init__(probe, criterion.distance, temperature)
         self.criterion = criterion
         criterion.strength(temperature)
         self.ahead = criterion.distance + self.paths.longest
@@ -156,14 +160,10 @@ class StressEvaluator(_AtDistance):
             return way.nodes, np.ones(1)
         return _on_face(way, way.s[:, None], min(self.distance, reach), self.surface.order)
 
-    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+    def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Traction in the tip frame (normal, growth direction, front), shape (n, 3)."""
         stencil = self.stencil(tips)
-        index = self.solver.index[self.p][stencil.nodes]
-        rows = np.unique(index[index >= 0])
-        values = np.zeros(self.solver.system.n_retained)
-        values[rows] = -self.solver.system.forces(state, rows)
-        traction = self.solver.vectors(self.p, stencil.nodes, values)
+        traction = self.probe.bond_forces(stencil.nodes, state)
         traction = stencil(traction / self.surface.areas[stencil.nodes][..., None])
         out = np.asarray(np.einsum("nci,nc->ni", tips.frame, traction))
         # a component that symmetry makes vanish must not become a cause of growth by its round-off
@@ -172,7 +172,7 @@ class StressEvaluator(_AtDistance):
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """F and the stresses s11 (normal), s12 (growth direction) and in 3-D s13 (front)."""
-        names = ("s11", "s12", "s13")[: self.solver.continuum.gdim]
+        names = ("s11", "s12", "s13")[: self.probe.gdim]
         f = self.criterion.value(measured, self.temperature_at(tips))
         return f, dict(zip(names, measured.T, strict=False))
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import ClassVar, Literal
+from typing import ClassVar, Literal, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -22,15 +23,13 @@ from fxcrack.criteria.crack_closure import (
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
-from fxcrack.criteria.mixed_mode import BK, MixedMode, total
-from fxcrack.criteria.probe import bond_forces, closure_jumps, openings
+from fxcrack.criteria.mixed_mode import BK, MixedMode, law_of, total
+from fxcrack.criteria.probe import FrontProbe, State, bond_forces, closure_jumps, openings
 from fxcrack.criteria.release_laws import Driver, ReleaseLaw
 from fxcrack.criteria.toughness import Property, check_property, resolve
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.tips import FrontUnits, Tips, edge_midsides, units_of
-from fxcrack.solvers.linear import LinearSolver
 
 Method = Literal["vcct", "closure"]
 
@@ -44,8 +43,9 @@ class RateCriterion(Criterion):
             position (n, gdim) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
         GIIc: Mode II toughness, likewise; GIc when not given.
         GIIIc: Mode III toughness, likewise; GIIc when not given.
-        mix: Mode-mix law. Needed as soon as GIIc or GIIIc is given. Without them all modes have the
-            toughness GIc and f = G_T/GIc.
+        mix: Mode-mix law, or a function f(G_I, G_II, G_III[, G_Ic, G_IIc, G_IIIc]) as one, see
+            :class:`~fxcrack.criteria.mixed_mode.FunctionLaw`. Needed as soon as GIIc or GIIIc is
+            given. Without them all modes have the toughness GIc and f = G_T/GIc.
         tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
         method: "vcct", or "closure": the exact energy of releasing the node.
         normalisation: Length VCCT divides by, see
@@ -55,7 +55,7 @@ class RateCriterion(Criterion):
     GIc: Property
     GIIc: Property | None = None
     GIIIc: Property | None = None
-    mix: MixedMode | None = field(default=None, kw_only=True)
+    mix: MixedMode | Callable[..., npt.ArrayLike] | None = field(default=None, kw_only=True)
     tolerance: float = field(default=0.2, kw_only=True)
     method: Method = field(default="vcct", kw_only=True)
     normalisation: Normalisation = field(default="tributary", kw_only=True)
@@ -69,11 +69,8 @@ class RateCriterion(Criterion):
         not_negative(self._owner, tolerance=self.tolerance)
         one_of(self._owner, "method", self.method, ("vcct", "closure"))
         one_of(self._owner, "normalisation", self.normalisation, NORMALISATIONS)
-        if self.mix is not None and (isinstance(self.mix, type) or not hasattr(self.mix, "ratio")):
-            raise InputError(
-                f"{self._owner}: mix = {self.mix!r} is no mode-mix law; give one with its "
-                "exponents, BK(eta=...), Reeder(eta=...) or Power(am=..., an=...)"
-            )
+        if self.mix is not None:
+            object.__setattr__(self, "mix", law_of(self._owner, self.mix))
         if self.mix is None and not (self.GIIc is None and self.GIIIc is None):
             raise InputError(
                 f"{self._owner}: GIIc or GIIIc is given but no mode-mix law; "
@@ -81,6 +78,12 @@ class RateCriterion(Criterion):
             )
         for name, value in self._properties().items():
             check_property(self._owner, name, value)
+
+    def evaluator(
+        self, probe: FrontProbe, temperature: InterfaceTemperature | None, *, softens: bool = False
+    ) -> RateEvaluator:
+        """The criterion on one interface; arguments as for :meth:`Criterion.evaluator`."""
+        return RateEvaluator(probe, self, temperature, softens=softens)
 
     @property
     def degree(self) -> float | None:
@@ -104,7 +107,7 @@ class RateCriterion(Criterion):
     @property
     def law(self) -> MixedMode:
         """The mode-mix law; with a single toughness any would do."""
-        return BK(eta=1.0) if self.mix is None else self.mix
+        return BK(eta=1.0) if self.mix is None else cast(MixedMode, self.mix)
 
     @property
     def release_range(self) -> tuple[float, float]:
@@ -221,8 +224,7 @@ class RateEvaluator(SofteningEvaluator):
     """Energy release rates by crack closure, for VCCT and the criteria built on it.
 
     Args:
-        solver: Condensed model.
-        p: Number of the pair.
+        probe: The interface.
         criterion: Criterion with toughness and mode mix.
         temperature: Temperature of the slave nodes; None without.
         softens: Whether bonds soften with their opening: second-order fronts then let go by element
@@ -231,21 +233,19 @@ class RateEvaluator(SofteningEvaluator):
 
     def __init__(
         self,
-        solver: LinearSolver,
-        p: int,
+        probe: FrontProbe,
         criterion: RateCriterion,
         temperature: InterfaceTemperature | None = None,
         *,
         softens: bool = False,
     ) -> None:
-        self.solver = solver
-        self.p = p
+        self.probe = probe
         self.criterion = criterion
-        self._edges = edge_midsides(solver.fronts[p].surface) if softens else {}
+        self._edges = edge_midsides(probe.front.surface) if softens else {}
         self._grouped: tuple[Tips, FrontUnits] | None = None
         self._weighed: Tips | None = None
         self._weights = np.zeros((0, 1))
-        surface = solver.pairs[p].surface
+        surface = probe.pair.surface
         criterion.check_slaves(surface.n_nodes)
         if softens and criterion.needs_exact_S and not criterion.softens:
             # The energy of releasing the node is the one it is to spend: its bond softens as fast
@@ -255,9 +255,9 @@ class RateEvaluator(SofteningEvaluator):
                 "and runs open at once, as with StepRelease, though its release is to follow the "
                 "opening; wide fronts carry a third too much so. Take method='vcct', or use "
                 "StepRelease",
-                solver.pairs[p].title,
+                probe.pair.title,
             )
-        x = surface.x[:, : solver.continuum.gdim]
+        x = surface.x[:, : probe.gdim]
         self._temperature = temperature
         self._moving = temperature is not None and not temperature.steady
         at_start = None if temperature is None else temperature(0.0)
@@ -268,19 +268,19 @@ class RateEvaluator(SofteningEvaluator):
         """That of the criterion; toughness that changes in time leaves none."""
         return None if self._moving else self.criterion.degree
 
-    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+    def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Tip forces and the openings they are multiplied with, shape (n, 6 k).
 
         A last column holds the temperature of the tips where it changes in time.
         """
-        force = bond_forces(self.solver, self.p, tips, state)
+        force = bond_forces(self.probe, tips, state)
         if self.criterion.method == "closure":
-            opening = closure_jumps(self.solver, self.p, tips, force)
+            opening = closure_jumps(self.probe, tips, force)
         else:
-            opening = openings(self.solver, self.p, tips, state)
+            opening = openings(self.probe, tips, state)
             if force.shape[1] == 2:
                 # on a ring the midside force belongs to its own circumference
-                breadth = self.solver.fronts[self.p].surface.breadth
+                breadth = self.probe.front.surface.breadth
                 force[:, 1] *= (breadth[tips.node] / breadth[tips.force_nodes[:, 1]])[:, None]
         columns = [force.reshape(len(tips), -1), opening.reshape(len(tips), -1)]
         if self._moving and self._temperature is not None:
@@ -333,8 +333,8 @@ class RateEvaluator(SofteningEvaluator):
         """Toughness by mode at the tips, shape (n, 3), force/length."""
         if not self._moving or measured is None:
             return self.toughness[tips.node]
-        surface = self.solver.pairs[self.p].surface
-        x = surface.x[tips.node, : self.solver.continuum.gdim]
+        surface = self.probe.pair.surface
+        x = surface.x[tips.node, : self.probe.gdim]
         return self.criterion.toughness_at(x, tips.node, measured[:, -1], n_slave=surface.n_nodes)
 
     def to_soften(self, nodes: Ints, values: TipValues, release: ReleaseLaw) -> list[CohesiveUnit]:
@@ -351,12 +351,12 @@ class RateEvaluator(SofteningEvaluator):
         Raises:
             NotPositiveDefinite: A body would come free: without bound is what its last unit frees.
         """
-        surface = self.solver.fronts[self.p].surface
+        surface = self.probe.front.surface
         tips, units = values.tips, self.units(values.tips)
         rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
         toughness = self._toughness(tips, values.measured)
         propagation = self.criterion.propagation_toughness_at(
-            self.solver.pairs[self.p].surface.x[tips.node, : self.solver.continuum.gdim],
+            self.probe.pair.surface.x[tips.node, : self.probe.gdim],
             tips.node,
             self._tip_temperature(tips, values.measured),
             n_slave=surface.n_nodes,

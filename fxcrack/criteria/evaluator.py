@@ -7,15 +7,18 @@ reports. So the place where f reaches 1 on a linear piece is found without anoth
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.errors import InputError
+from fxcrack.base.roots import bracketed_root
+from fxcrack.criteria.probe import FrontProbe, State, bond_forces, openings
 from fxcrack.criteria.release_laws import ReleaseLaw
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.tips import FrontUnits, Tips
 
 
@@ -35,7 +38,7 @@ class TipValues:
     f: Array
     report: dict[str, Array]
     measured: Array | None = None
-    state: Equilibrium | None = None
+    state: State | None = None
 
     @property
     def largest(self) -> int:
@@ -62,7 +65,7 @@ class Evaluator(Protocol):
         """Power of a proportional load with which f grows; None where it does not so."""
         return None
 
-    def measure(self, tips: Tips, state: Equilibrium, time: float) -> Array:
+    def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Quantities linear between equilibria, shape (n_tips, m)."""
         ...
 
@@ -97,6 +100,8 @@ class SofteningEvaluator(Evaluator, Protocol):
         ...
 
 
+_AT_ONE = 4e-15
+"""How near to 1 a power of f is at a crossing."""
 _ROUND_OFF = 1e-13
 """Differences below this fraction of the largest value do not make a path bend."""
 
@@ -122,7 +127,7 @@ def first_tips(tips: Tips, n: int) -> Tips:
 def first_crossing(
     evaluator: Evaluator,
     tips: Tips,
-    ends: tuple[tuple[Equilibrium, float], tuple[Equilibrium, float]],
+    ends: tuple[tuple[State, float], tuple[State, float]],
     *,
     upward: bool = True,
     known: TipValues | None = None,
@@ -132,7 +137,7 @@ def first_crossing(
     Args:
         evaluator: The criterion.
         tips: Front nodes.
-        ends: Equilibrium and time at both ends.
+        ends: State and time at both ends.
         upward: Look for f rising to 1, or falling to it.
         known: What was found before, perhaps at the first end.
 
@@ -157,35 +162,78 @@ def first_crossing(
             x = rise / (scale - 1.0) if scale != 1.0 else np.inf
             return float(x) if 0.0 <= x <= 1.0 else None
 
-    power = 1.0 if degree is None else 1.0 / degree
+    # f^(1/degree) is linear under a proportional load; without a degree that of rates is usual
+    power = 0.5 if degree is None else 1.0 / degree
 
-    def root(x: Array) -> Array:
+    def excess(x: Array) -> Array:
         many = np.concatenate([(1.0 - y) * a + y * b for y in x])
         f, _ = evaluator.value(repeat_tips(tips, len(x)), many)
         largest = np.maximum(f.reshape(len(x), n).max(axis=1), 0.0)
         return np.asarray(largest**power - 1.0)
 
     grid = np.linspace(0.0, 1.0, 9)
-    values = root(grid)
+    values = excess(grid)
     passed = values >= 0.0 if upward else values <= 0.0
     if not passed.any():
         return None
     k = int(np.argmax(passed))
     if k == 0:
         return 0.0
-    low, high, f_low, f_high = grid[k - 1], grid[k], values[k - 1], values[k]
-    for _ in range(60):
-        # linear for proportional loads: the secant hits at once (Illinois safeguard otherwise)
-        x = low - f_low * (high - low) / (f_high - f_low)
-        if not low < x < high:
-            break
-        value = float(root(np.array([x]))[0])
-        if abs(value) < 4e-15:
-            return float(x)
-        if (value >= 0.0) == upward:
-            high, f_high, f_low = x, value, 0.5 * f_low
-        else:
-            low, f_low, f_high = x, value, 0.5 * f_high
-        if high - low < 1e-15:
-            break
-    return float(high)
+    return bracketed_root(
+        lambda x: float(excess(np.array([x]))[0]),
+        *map(float, (grid[k - 1], grid[k], values[k - 1], values[k])),
+        close=_AT_ONE,
+    )
+
+
+class TipEvaluator(Evaluator):
+    """A criterion that is a function of bond forces and openings at the tips.
+
+    Args:
+        probe: The interface.
+        function: Called with the tips, their bond forces (tension positive) and the openings behind
+            them, both as (normal, growth direction, front tangent) of shape (n, k, 3), k = 1 or,
+            for second order, 2 (corner, midside) [force, length]. It returns f of shape (n,), or f
+            and a dictionary of arrays of shape (n,) that the history reports. f must not depend on
+            the other tips of the call.
+        degree: Power of a proportional load with which f grows; None if it is no power.
+    """
+
+    def __init__(
+        self,
+        probe: FrontProbe,
+        function: Callable[[Tips, Array, Array], Array | tuple[Array, dict[str, Array]]],
+        degree: float | None = None,
+    ) -> None:
+        self.probe = probe
+        self._function = function
+        self._degree = degree
+
+    @property
+    def degree(self) -> float | None:
+        """As given."""
+        return self._degree
+
+    def measure(self, tips: Tips, state: State, time: float) -> Array:
+        """Forces and openings, shape (n, 6 k)."""
+        both = bond_forces(self.probe, tips, state), openings(self.probe, tips, state)
+        return np.concatenate([x.reshape(len(tips), -1) for x in both], axis=1)
+
+    def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
+        """F and report of the function.
+
+        Raises:
+            InputError: f has another shape than (n,), or is NaN.
+        """
+        n = len(tips)
+        force, opening = np.split(measured, 2, axis=1)
+        found = self._function(tips, force.reshape(n, -1, 3), opening.reshape(n, -1, 3))
+        f, report = found if isinstance(found, tuple) else (found, {})
+        f = np.asarray(f, dtype=np.float64)
+        if f.shape != (n,) or np.isnan(f).any():
+            what = f"has shape {f.shape}" if f.shape != (n,) else "is NaN"
+            raise InputError(
+                f"interface '{self.probe.pair.title}': f of the criterion {what}; its function "
+                f"must return one number per tip, shape ({n},), or such an array and a dictionary"
+            )
+        return f, {name: np.asarray(values, dtype=np.float64) for name, values in report.items()}

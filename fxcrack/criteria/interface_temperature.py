@@ -16,7 +16,8 @@ from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import AmplitudeLike
-from fxcrack.interface.nodes import NodeValues
+from fxcrack.criteria.probe import FrontProbe
+from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 
 Given = float | Callable[[Array], npt.ArrayLike] | None
@@ -51,6 +52,30 @@ class InterfaceTemperature:
         return tuple(b for a in self.amplitudes for b in a.breaks())
 
 
+def steady(
+    temperature: InterfaceTemperature | None, probe: FrontProbe, criterion: object
+) -> Array | None:
+    """Temperature of the slave nodes, shape (n_nodes,), which never changes; None without.
+
+    Args:
+        temperature: That of the interface.
+        probe: The interface.
+        criterion: Who asks.
+
+    Raises:
+        InputError: It changes in time.
+    """
+    if temperature is None:
+        return None
+    if not temperature.steady:
+        raise InputError(
+            f"interface '{probe.pair.title}': {type(criterion).__name__} cannot follow a "
+            "temperature that changes in time; give Debond(temperature=...), or a criterion by "
+            "energy release rates"
+        )
+    return temperature(0.0)
+
+
 def given_temperature(pair: Pair, gdim: int, temperature: Given) -> InterfaceTemperature | None:
     """Temperature a user gave for an interface; None without.
 
@@ -81,12 +106,11 @@ def scene_temperature(pair: Pair, continuum: Continuum) -> InterfaceTemperature 
     field = continuum.temperature
     if field is None:
         return None
-    reader = NodeValues(continuum, pair.surface.dofs)
-    rows = reader.find(pair.surface.dofs)
+    nodes = InterfaceNodes(continuum.layout, pair.surface.dofs)
+    rows = nodes.find(pair.surface.dofs)
 
     def at_nodes(values: Array) -> Array:
-        owned = np.repeat(values, continuum.gdim)[: continuum.n_local]
-        return np.asarray(reader.gather(owned)[rows, 0])
+        return np.asarray(nodes.share(values[nodes.local])[rows])
 
     patterns = np.array([at_nodes(p) for p in field.nodal_patterns(continuum.space)])
     base = np.full(len(rows), field.effect.reference)

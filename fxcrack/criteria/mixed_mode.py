@@ -6,21 +6,25 @@ The criterion is f = 1; G_c is the critical total rate at the present mode mix:
     Reeder  G_c = G_Ic + (G_IIc - G_Ic) B^eta + (G_IIIc - G_IIc) G_III/(G_II + G_III) B^eta
     power   f = (G_I/G_Ic)^am + (G_II/G_IIc)^an + (G_III/G_IIIc)^ao
 
-Negative rates count as zero. All laws depend on rates only through their ratios to the toughness,
-so any system of units will do.
+A user's own law is a function of the rates, :class:`FunctionLaw`. Negative rates count as zero. The
+laws above depend on rates only through their ratios to the toughness, so any system of units will
+do.
 """
 
 from __future__ import annotations
 
+import inspect
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import ClassVar, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import positive
+from fxcrack.base.checks import missing_members, positive
+from fxcrack.base.errors import InputError
 
 
 class MixedMode(Protocol):
@@ -29,7 +33,7 @@ class MixedMode(Protocol):
     @property
     def degree(self) -> float | None:
         """Power of the rates with which f grows when all grow in proportion; None: no power."""
-        ...
+        return None
 
     def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
         """Value f of the criterion, shape (n,); growth at 1."""
@@ -185,6 +189,141 @@ class Power:
         relative = np.where(some[..., None], shares / tough, np.array([1.0, 0.0, 0.0]))
         scale = np.exp(_log_scale_to_one(relative, self.exponents))
         return np.where(some, scale * shares.sum(axis=-1), tough[..., 0])
+
+
+@dataclass(frozen=True)
+class FunctionLaw(MixedMode):
+    """A law given as a function; what ``mix=`` of a criterion makes of one.
+
+    Attributes:
+        function: f = function(G_I, G_II, G_III, G_Ic, G_IIc, G_IIIc), or of the three rates alone:
+            arrays of shape (n,) [force/length] to values of that shape, not negative and rising
+            with each rate; growth at 1. Negative rates are given as zero, and f = 0 where all
+            are. Each row must not depend on the others.
+    """
+
+    function: Callable[..., npt.ArrayLike]
+    _n: int = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Find out how many arguments the function takes.
+
+        Raises:
+            InputError: Neither three nor six.
+        """
+        try:
+            signature = inspect.signature(self.function)
+        except ValueError:
+            signature = inspect.Signature()
+        for n in (6, 3):
+            try:
+                signature.bind(*range(n))
+            except TypeError:
+                continue
+            object.__setattr__(self, "_n", n)
+            return
+        raise InputError(
+            f"mix = {self._name} must be a function of (GI, GII, GIII) or of (GI, GII, GIII, GIc, "
+            "GIIc, GIIIc) that returns f"
+        )
+
+    @property
+    def _name(self) -> str:
+        return str(getattr(self.function, "__name__", self.function))
+
+    def ratio(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Value f of the function.
+
+        Args:
+            rates: Energy release rates by mode, shape (n, 3) [force/length].
+            toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) or (3,) [force/length].
+
+        Returns:
+            Values, shape (n,); 0 where all rates are zero.
+
+        Raises:
+            InputError: The function returned another shape, NaN or negative values.
+        """
+        g = clip(rates)
+        tough = np.broadcast_to(np.asarray(toughness, dtype=np.float64), g.shape)
+        some = g.max(axis=-1) > 0.0
+        # a mode mix is not defined where nothing is released: the function is not asked there
+        given = np.where(some[..., None], g, tough).reshape(-1, 3)
+        arguments = (*given.T, *tough.reshape(-1, 3).T)[: self._n]
+        f = np.asarray(self.function(*arguments), dtype=np.float64)
+        if f.shape != given.shape[:1]:
+            raise InputError(
+                f"mix: {self._name} returned shape {f.shape} for rates of shape "
+                f"{given.shape[:1]}; it must return one value of f for each"
+            )
+        bad = np.flatnonzero(~(f >= 0.0))
+        if bad.size:
+            row = given[bad[0]]
+            raise InputError(
+                f"mix: {self._name} returned f = {f[bad[0]]:g} for GI = {row[0]:g}, GII = "
+                f"{row[1]:g}, GIII = {row[2]:g}; f must be a number, zero or larger"
+            )
+        nothing = np.where(np.isnan(g).any(axis=-1), np.nan, 0.0)
+        return np.where(some, f.reshape(some.shape), nothing)
+
+    def critical(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> Array:
+        """Total rate at which f = 1 at the present mode mix; G_Ic where all rates are zero.
+
+        Arguments as for :meth:`ratio`.
+
+        Returns:
+            Critical rates, shape (n,) [force/length].
+
+        Raises:
+            InputError: f does not pass 1 when the rates grow from zero at this mode mix.
+        """
+        shares = _normalised(rates)
+        tough = np.broadcast_to(np.asarray(toughness, dtype=np.float64), shares.shape)
+        some = shares.max(axis=-1) != 0.0
+        unit = np.where(some[..., None], shares, np.array([1.0, 0.0, 0.0]))
+        scale = np.ones(some.shape) * tough.max(axis=-1)
+        low, high = scale.copy(), scale.copy()
+        for _ in range(_DOUBLINGS):
+            above = self.ratio(low[..., None] * unit, tough) > 1.0
+            below = self.ratio(high[..., None] * unit, tough) < 1.0
+            if not (above.any() or below.any()):
+                break
+            low, high = np.where(above, 0.5 * low, low), np.where(below, 2.0 * high, high)
+        else:
+            raise InputError(
+                f"mix: f of {self._name} does not pass 1 when the rates grow at a constant mode "
+                f"mix, e.g. at GI : GII : GIII = {unit[above | below][0]}; f must rise with the "
+                "rates"
+            )
+        for _ in range(_DOUBLINGS):
+            middle = 0.5 * (low + high)
+            above = self.ratio(middle[..., None] * unit, tough) > 1.0
+            low, high = np.where(above, low, middle), np.where(above, middle, high)
+            if np.all(high - low <= 1e-15 * high):
+                break
+        return np.where(some, high * unit.sum(axis=-1), tough[..., 0])
+
+
+_DOUBLINGS = 200
+"""How often a bracket of the critical rate is doubled or halved at most."""
+
+
+def law_of(owner: str, mix: MixedMode | Callable[..., npt.ArrayLike]) -> MixedMode:
+    """A law from what a user gave as ``mix``: a law, or a function (:class:`FunctionLaw`).
+
+    Raises:
+        InputError: It is neither.
+    """
+    if not hasattr(mix, "ratio") and callable(mix) and not isinstance(mix, type):
+        return FunctionLaw(mix)
+    missing = missing_members(mix, MixedMode)
+    if missing:
+        raise InputError(
+            f"{owner}: mix = {mix!r} is no mode-mix law; give one with its exponents, "
+            f"BK(eta=...), Reeder(eta=...) or Power(am=..., an=...), or a function of the rates "
+            f"({missing})"
+        )
+    return cast(MixedMode, mix)
 
 
 def _log_scale_to_one(x: Array, exponents: Array) -> Array:

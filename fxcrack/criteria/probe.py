@@ -1,34 +1,127 @@
-"""Forces, openings and jumps at the tips, as criteria ask for them."""
+"""What a criterion may ask of a state of one interface, and forces and openings at the tips.
+
+A :class:`FrontProbe` answers for one interface on one solver; criteria see nothing else of it.
+Vectors are global, with three components also in 2-D (the third is zero there). Forces are those of
+the full thickness or ring.
+"""
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import numpy as np
-import numpy.typing as npt
-from scipy.linalg import cho_solve
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.criteria.crack_closure import opens
-from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.front import Front
+from fxcrack.interface.pairing import Pair
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.base import InterfaceSolver
 
-_UNBOUNDED = 1e100
-"""Jump per force of a unit that holds a body alone."""
+State = Any
+"""A state of the solver, e.g. an equilibrium; criteria hand it on to the probe and read nothing."""
 
 
-def bond_forces(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium) -> Array:
-    """Tension-positive bond forces at the tips in the tip frames, shape (n, k, 3).
+class FrontProbe(Protocol):
+    """One interface of a solver, as criteria see it; every solver provides its own.
+
+    ``nodes`` are slave nodes, numbers in the slave surface, of any shape (...).
+    """
+
+    @property
+    def pair(self) -> Pair:
+        """The interface: title, slave surface with positions and areas, frames, gaps [length]."""
+        ...
+
+    @property
+    def front(self) -> Front:
+        """Which nodes are bonded, tips, and the slave surface where it is now."""
+        ...
+
+    @property
+    def gdim(self) -> int:
+        """Number of components of a displacement, 2 or 3."""
+        ...
+
+    def bond_forces(self, nodes: Ints, state: State) -> Array:
+        """Forces that the bonds hold the slave nodes with, tension positive.
+
+        Returns:
+            Global vectors, shape (..., 3) [force]; zero where nothing is bonded.
+        """
+        ...
+
+    def jumps(self, nodes: Ints, state: State) -> Array:
+        """Displacement of slave nodes less that of the master surface at their place.
+
+        Returns:
+            Global vectors, shape (..., 3) [length]; an opening is positive along the normal, which
+            points from master to slave.
+        """
+        ...
+
+    @property
+    def has_face_loads(self) -> bool:
+        """Whether loads act on the crack faces anywhere."""
+        ...
+
+    def face_loads(self, nodes: Ints, state: State) -> Array:
+        """Loads on the crack faces at slave nodes, as they act on the slave side.
+
+        Returns:
+            Global vectors, shape (..., 3) [force].
+        """
+        ...
+
+    def released_jumps(self, nodes: Ints, force: Array, normal: Array | None = None) -> Array:
+        """Jumps that releasing some nodes would open, everything else as it is in the last state.
+
+        Args:
+            nodes: Bonded slave nodes, shape (k,).
+            force: Their bond forces, global vectors, tension positive, shape (k, 3) [force].
+            normal: Direction in which nothing moves, shape (3,); None: all components are released.
+
+        Returns:
+            Global vectors, shape (k, 3) [length].
+        """
+        ...
+
+    def mean_position(self, group: str) -> Array:
+        """Mean position of the nodes of a group in the undeformed body, shape (3,); collective.
+
+        Raises:
+            InputError: The mesh has no such group, or it holds no node.
+        """
+        ...
+
+    def follow(self, where: str | int) -> int:
+        """Follow the mean displacement of a group, or that of a slave node; before the first step.
+
+        Returns:
+            Its row in :meth:`motion`.
+        """
+        ...
+
+    def motion(self, state: State) -> Array:
+        """Displacements that are followed, shape (n_followed, gdim) [length]."""
+        ...
+
+
+def bond_forces(probe: FrontProbe, tips: Tips, state: State) -> Array:
+    """Bond forces at the force nodes of tips in the tip frames, tension positive.
 
     Loads on the crack faces are carried on to the faces that would open.
+
+    Args:
+        probe: The interface.
+        tips: Front nodes.
+        state: State of the solver.
+
+    Returns:
+        Components (normal, growth direction, front tangent), shape (n, k, 3) [force].
     """
-    index = solver.index[p][tips.force_nodes]
-    rows = np.unique(index[index >= 0])
-    values = np.zeros(solver.system.n_retained)
-    values[rows] = -solver.system.forces(state, rows)
-    vectors = solver.vectors(p, tips.force_nodes, values)
-    if np.any(solver.face_loads):
-        vectors = vectors + _loads_to_come(solver, p, tips, state)
+    vectors = probe.bond_forces(tips.force_nodes, state)
+    if probe.has_face_loads:
+        vectors = vectors + _loads_to_come(probe, tips, state)
     out = np.einsum("nci,nkc->nki", tips.frame, vectors)
     if tips.force_nodes.shape[1] > 1:
         # at the end of a surface there is no midside node ahead
@@ -36,7 +129,7 @@ def bond_forces(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium)
     return np.asarray(out)
 
 
-def _loads_to_come(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium) -> Array:
+def _loads_to_come(probe: FrontProbe, tips: Tips, state: State) -> Array:
     """Load on the faces the crack is about to open, if that of the wake goes on there.
 
     A pressure p on the faces leaves the bond forces short by p times the part of the tip's
@@ -46,92 +139,52 @@ def _loads_to_come(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibri
     Returns:
         Global vectors per force node, shape (n, k, 3).
     """
-    areas = solver.pairs[p].surface.areas
-    loads = solver.face_loads @ state.loads[solver.n_loads - len(solver.loads) :]
-    wake = solver.vectors(p, tips.wake_nodes, loads).sum(axis=(1, 2))
+    areas = probe.pair.surface.areas
+    wake = probe.face_loads(tips.wake_nodes, state).sum(axis=(1, 2))
     density = wake / areas[tips.wake_nodes].sum(axis=(1, 2))[:, None]
     whole = areas[tips.force_nodes][..., None] * density[:, None]
-    present = solver.vectors(p, tips.force_nodes, loads)
-    to_come = whole - present
+    to_come = whole - probe.face_loads(tips.force_nodes, state)
     to_come[~np.any(density, axis=1)] = 0.0
     return np.asarray(to_come)
 
 
-def openings(solver: InterfaceSolver, p: int, tips: Tips, state: Equilibrium) -> Array:
-    """Openings behind the tips in the tip frames, shape (n, k, 3), length."""
-    jump = solver.vectors(p, tips.wake_nodes, state.jump)
+def openings(probe: FrontProbe, tips: Tips, state: State) -> Array:
+    """Openings behind tips in the tip frames.
+
+    Args:
+        probe: The interface.
+        tips: Front nodes.
+        state: State of the solver.
+
+    Returns:
+        Components (opening, slip, tear), shape (n, k, 3) [length]; k = 1 the wake node, k = 2
+        (second order) the wake corner and the wake midside.
+    """
+    jump = probe.jumps(tips.wake_nodes, state)
     jump = np.einsum("nkm,nkmc->nkc", tips.wake_weights, jump)
     return np.asarray(np.einsum("nci,nkc->nki", tips.frame, jump))
 
 
-def closure_jumps(solver: InterfaceSolver, p: int, tips: Tips, force: Array) -> Array:
-    """Jumps that letting each unit go alone would open, shape (n, k, 3), length.
+def closure_jumps(probe: FrontProbe, tips: Tips, force: Array) -> Array:
+    """Jumps that releasing the force nodes of each tip alone would open, in the tip frames.
 
     Args:
-        solver: The model.
-        p: Number of the pair.
+        probe: The interface.
         tips: Front nodes.
-        force: Their bond forces in tip frames, shape (n, k, 3).
+        force: Their bond forces in the tip frames, shape (n, k, 3) [force].
+
+    Returns:
+        Shape (n, k, 3) [length].
     """
     out = np.zeros_like(force)
     for i in range(len(tips)):
         nodes = np.unique(tips.force_nodes[i])
-        index = solver.index[p][nodes]
         order = np.searchsorted(nodes, tips.force_nodes[i, : len(nodes)])
-        frames, pulls = solver.frames[p][nodes], force[i, : len(nodes)]
-        local = np.zeros((len(nodes), solver.continuum.gdim))
-        local[order] = _turned(frames[order], pulls @ tips.frame[i].T)
-        free = index >= 0
-        jump = _released(solver, index, free, local, frames)[order] @ tips.frame[i]
-        if not opens(pulls[None, :, 0], jump[None, :, 0])[0]:
+        frame, pulls = tips.frame[i], np.zeros((len(nodes), 3))
+        pulls[order] = force[i, : len(nodes)] @ frame.T
+        jump = probe.released_jumps(nodes, pulls)[order] @ frame
+        if not opens(force[None, i, : len(nodes), 0], jump[None, :, 0])[0]:
             # pressed together: it stays closed, shear alone is released
-            jump = _released(solver, index, free, local, frames, tips.frame[i][:, 0])
-            jump = jump[order] @ tips.frame[i]
+            jump = probe.released_jumps(nodes, pulls, frame[:, 0])[order] @ frame
         out[i, : len(nodes)] = jump
     return out
-
-
-def _turned(frames: Array, vectors: Array) -> Array:
-    """Global vectors, shape (k, 3), in local frames of shape (k, gdim, gdim)."""
-    return np.asarray(np.einsum("kci,kc->ki", frames, vectors[:, : frames.shape[1]]))
-
-
-def _released(
-    solver: InterfaceSolver,
-    index: Ints,
-    free: npt.NDArray[np.bool_],
-    force: Array,
-    frames: Array,
-    normal: Array | None = None,
-) -> Array:
-    """Jumps of a unit without some of its bonds, global vectors of shape (k, 3).
-
-    Args:
-        solver: The model.
-        index: Components in the window, shape (k, gdim).
-        free: Those let go, likewise.
-        force: Their bond forces in local frames, likewise.
-        frames: These, shape (k, gdim, gdim).
-        normal: Direction, shape (3,), in which nothing moves, be it none of the local frames' (they
-            do not turn with the bodies); ``None`` for none.
-    """
-    jump = np.zeros(index.shape)
-    star = solver.system.reduced(index[free])
-    try:
-        factor = solver.system.cholesky.factorise(star, index[free])
-    except NotPositiveDefinite:
-        if normal is not None:
-            tangential = free & (np.arange(index.shape[1]) > 0)
-            return _released(solver, index, tangential, force, frames)
-        factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
-    jump[free] = cho_solve((factor, True), force[free])
-    if normal is not None:
-        k = len(index)
-        across = np.zeros((*index.shape, k))
-        across[range(k), :, range(k)] = np.einsum("kci,c->ki", frames, normal[: frames.shape[1]])
-        held = across[free]
-        given = cho_solve((factor, True), held)
-        jump[free] -= given @ np.linalg.lstsq(held.T @ given, held.T @ jump[free])[0]
-    world = np.zeros((len(index), 3))
-    world[:, : index.shape[1]] = np.einsum("kci,ki->kc", frames, jump)
-    return world

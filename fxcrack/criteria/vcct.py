@@ -32,8 +32,10 @@ class VCCT(RateCriterion):
             position (n, gdim) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
         GIIc: Mode II toughness, likewise; GIc when not given.
         GIIIc: Mode III toughness, likewise; GIIc when not given.
-        mix: :class:`~fxcrack.BK`, :class:`~fxcrack.Power` or :class:`~fxcrack.Reeder`. Needed as
-            soon as GIIc or GIIIc is given. Without them f = G_T/GIc.
+        mix: :class:`~fxcrack.BK`, :class:`~fxcrack.Power`, :class:`~fxcrack.Reeder`, or a function
+            f(G_I, G_II, G_III[, G_Ic, G_IIc, G_IIIc]), see
+            :class:`~fxcrack.criteria.mixed_mode.FunctionLaw`. Needed as soon as GIIc or GIIIc is
+            given. Without them f = G_T/GIc.
         tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
         method: "vcct", or "closure": the exact energy of releasing the node.
         normalisation: Length VCCT divides by, see :func:`energy_release_rates`.

@@ -56,7 +56,8 @@ def renewed(
     aside = np.linalg.norm(away - gap[:, None] * normals, axis=1)
     size = now.facet_size
     over = ~bonded & (aside <= 0.1 * size + 0.1 * np.abs(gap))
-    masters = now.dofs[now.facets[foot.facet]]
+    nodes = now.facets[foot.facet]
+    masters = now.dofs[nodes]
     near = over & (gap < _NEAR * size)
     slid = (masters != pair.masters).any(axis=1)
     slid |= np.abs(foot.weights - pair.weights).max(axis=1) > _SLIDE
@@ -67,21 +68,32 @@ def renewed(
     new_masters = pair.masters.copy()
     frames[over] = local_frames(normals, gdim)[over]
     weights[over], new_masters[over] = foot.weights[over], masters[over]
-    checkpoint_point = np.einsum("nk,nkc->nc", foot.weights, master.x[master.facets[foot.facet]])
-    gaps[over] = np.einsum("nc,nc->n", pair.surface.x - checkpoint_point, normals)[over]
-    paired = np.where(bonded, pair.paired, over)
+    maps = pair.master_maps
+    if maps is not None and master.point_maps is not None:
+        maps = maps.copy()
+        maps[over] = master.point_maps[nodes[over]]
+    undeformed = np.einsum("nk,nkc->nc", foot.weights, master.x[nodes])
+    gaps[over] = np.einsum("nc,nc->n", pair.surface.x - undeformed, normals)[over]
     return replace(
-        pair, paired=paired, masters=new_masters, weights=weights, frames=frames, gap=gaps
+        pair,
+        paired=np.where(bonded, pair.paired, over),
+        masters=new_masters,
+        weights=weights,
+        frames=frames,
+        gap=gaps,
+        master_maps=maps,
     )
 
 
 def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
     """:data:`CHANGING` of a pair, masters as nodes of their surface: the same on any ranks."""
     order = np.argsort(master.dofs)
-    place = order[np.searchsorted(master.dofs[order], pair.masters)]
-    return {name: getattr(pair, name) for name in CHANGING} | {"masters": place}
+    nodes = order[np.searchsorted(master.dofs[order], pair.masters)]
+    return {name: getattr(pair, name) for name in CHANGING} | {"masters": nodes}
 
 
 def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray[Any]]) -> Pair:
     """A pair with what :func:`changing` has said, on any number of ranks."""
-    return replace(pair, **{**known, "masters": master.dofs[known["masters"]]})
+    nodes = known["masters"]
+    changed = {**known, "masters": master.dofs[nodes], "master_maps": master.maps_at(nodes)}
+    return replace(pair, **changed)

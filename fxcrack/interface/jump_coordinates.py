@@ -1,16 +1,53 @@
-"""Jump coordinates: the transformation u = T q of design.md, section 2.
+"""Jump coordinates: the transformation u = T q from jumps of slave nodes to displacements.
+
+A slave node s lies on a facet of the master surface with the shape functions W (they sum to 1),
+and R = [n t1 t2] is its local frame (columns; n points from master to slave):
+
+    u_s = sum_m W_sm u_m + R_s delta_s,    delta = (opening, slip, tear)
+
+Every other dof keeps its own displacement. So u = T q with T square, invertible and sparse, and
+constant while slave nodes keep their master points (small sliding). On matching meshes the only
+weight is 1. In these coordinates residual and stiffness are
+
+    r_q = T^t r_u,    A = T^t K T
+
+and the states of an interface are statements about single coordinates:
+
+* bonded: delta = 0, and its row of r_q is the force of the bond on the slave node in the local
+  frame, without penalty, multiplier or recovery; bonded in the normal direction only: delta_n = 0;
+* released: delta is free and its force is zero, or prescribed while a release ramp lasts;
+* in contact: delta_n >= 0, p_n >= 0, delta_n p_n = 0, with friction |p_t| <= mu p_n.
+
+T stays as it is when nodes are released, and slave and master may belong to different ranks.
+
+Where the unknowns of a node are more than its displacement (shells), u_s and u_m above are those of
+points on the bonded faces, u_point = P q_node with P = [1 Z] (:mod:`fxcrack.continuum.dof_layout`).
+Solved for the displacement of the slave node, a row of T holds a small block for each master,
+
+    u_s = sum_m W_sm P_m q_m - Z_s w_s + R_s delta_s
+
+and the slave's further unknowns w_s keep columns of their own.
+
+Rules, each with an error on all ranks together: a node is a slave once only; a slave may be a
+master of another interface (such chains are composed) but not, over any number of interfaces, of
+itself; a bonded slave node projects onto the master surface within the search tolerance
+(:mod:`fxcrack.interface.pairing`); where a support holds a displacement component of a bonded
+slave node, it holds its masters in the same way. The frame's tangent then lies along that
+component, and this jump is held at zero and carries no bond force
+(:mod:`fxcrack.interface.supports`).
 
 Columns of T, in this order on each rank:
 
-* inner coordinates: free displacements, and jumps outside the window that are free;
-* on rank 0 only, last: window jumps, one column per prescribed displacement component
-  (u = d times its shape), and empty columns kept for the borders of force patterns and monitors.
+* inner coordinates: free displacements, and free jumps that are not retained;
+* on rank 0 only, last: retained jumps, one column per prescribed displacement component
+  (u = d times its shape), and empty columns for the borders of force patterns and monitors.
 
-A bonded jump outside the window has no column: it is zero.
+A fixed jump has no column: it is zero.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,15 +56,15 @@ import scipy.sparse as sp
 from petsc4py import PETSc
 from scipy.sparse.csgraph import connected_components
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
-from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 FIXED, FREE, RETAINED = 0, 1, 2
-"""Roles of a jump component: zero for good, free in the continuum, or part of the window."""
+"""Roles of a jump component: zero for good, free in the continuum, or retained."""
 
 
 @dataclass
@@ -38,19 +75,20 @@ class JumpCoordinates:
         transform: T, PETSc AIJ, shape (n_global, n_coordinates).
         frames: Frame of each slave node per pair, aligned with supports, (n_nodes, gdim, gdim).
         held: Jump components that supports hold at zero, per pair, shape (n_nodes, gdim).
-        index: Window number of each jump component per pair, -1 outside, shape (n_nodes, gdim).
-        n_retained: Number of window components.
-        n_supports: Number of support columns, which follow the window.
+        index: Number among the retained jumps of each jump component per pair, -1 where it is not
+            retained, shape (n_nodes, gdim).
+        n_retained: Number of retained jumps.
+        n_supports: Number of support columns, which follow the retained jumps.
         n_borders: Number of empty columns, which come last.
         n_inner: Inner coordinates of this rank.
-        first: Global number of the first window column.
-        inner_dofs: Owned displacement dof each inner coordinate belongs to, ascending; a free
-            jump takes the place of its slave node's component, shape (n_inner,).
+        first: Global number of the first retained column.
+        inner_dofs: Owned dof each inner coordinate belongs to, ascending; a free jump takes the
+            place of its slave node's component, shape (n_inner,).
     """
 
     transform: PETSc.Mat
     frames: list[Array]
-    held: list[npt.NDArray[np.bool_]]
+    held: list[Bools]
     index: list[Ints]
     n_retained: int
     n_supports: int
@@ -61,21 +99,21 @@ class JumpCoordinates:
 
     @property
     def n_last(self) -> int:
-        """Window, support and border columns together."""
+        """Retained, support and border columns together."""
         return self.n_retained + self.n_supports + self.n_borders
 
 
 def build_coordinates(
-    continuum: Continuum,
-    pairs: list[Pair],
-    roles: list[npt.NDArray[np.int8]],
+    layout: DofLayout,
+    pairs: Sequence[Pair],
+    roles: Sequence[npt.NDArray[np.int8]],
     supports: Supports,
     n_borders: int,
 ) -> JumpCoordinates:
     """Number the coordinates and build T; collective.
 
     Args:
-        continuum: Displacement space.
+        layout: Unknowns of nodes and their numbers.
         pairs: Interfaces.
         roles: FIXED, FREE or RETAINED per pair and jump component, shape (n_nodes, gdim).
         supports: Prescribed components.
@@ -85,43 +123,37 @@ def build_coordinates(
         InterfaceError: A slave used twice, a cycle of slaves and masters, a support on a slave
             node that its masters do not share.
     """
-    gdim, comm = continuum.gdim, continuum.comm
+    gdim, comm = layout.gdim, layout.comm
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
-    replica = InterfaceNodes(continuum, pairs, supports.which, supports.value, jumped)
-    check_slaves(pairs, jumped, replica, supports)
-    slaves = [replica.find(p.surface.dofs) for p in pairs]
-    paired = [np.flatnonzero(j) for j in jumped]
+    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped)
+    which, value = supports.at_nodes(nodes)
+    check_slaves(pairs, jumped, nodes, which, value, supports)
+    links = [
+        _Link(pair, np.flatnonzero(j), nodes.find(pair.surface.dofs[j]))
+        for pair, j in zip(pairs, jumped, strict=True)
+    ]
 
-    def at_slaves(table: Ints, fill: int) -> list[Ints]:
-        out = []
-        for p, s, k in zip(pairs, slaves, paired, strict=True):
-            rows = np.full((p.surface.n_nodes, gdim), fill, dtype=table.dtype)
-            rows[k] = table[s[k]]
-            out.append(rows)
-        return out
-
-    frames, held = align_frames(
-        pairs,
-        at_slaves(replica.which, -1),
-        jumped,
-        supports,
-        gdim,
-    )
+    prescribed = []
+    for link in links:
+        rows = np.full((link.pair.surface.n_nodes, gdim), -1, dtype=np.int64)
+        rows[link.slaves] = which[link.nodes, :gdim]
+        prescribed.append(rows)
+    frames, held = align_frames(pairs, prescribed, jumped, supports, gdim)
     roles = [
         np.where(h | ~j[:, None], FIXED, r) for r, h, j in zip(roles, held, jumped, strict=True)
     ]
 
-    # which owned dof slots have a column of their own
+    # which owned dofs have a column of their own
     own = np.asarray(supports.which < 0)
-    is_slave = np.zeros((len(replica.blocks), gdim), dtype=bool)
-    inner_slave = np.zeros((len(replica.blocks), gdim), dtype=bool)
-    for s, k, role in zip(slaves, paired, roles, strict=True):
-        is_slave[s[k]] = True
-        inner_slave[s[k]] = role[k] == FREE
-    mine = (replica.blocks[replica.mine] - replica.low)[:, None] * gdim + np.arange(gdim)
-    slave_here = is_slave[replica.mine]
-    own[mine[slave_here]] = inner_slave[replica.mine][slave_here]
+    follows = np.zeros((len(nodes), layout.n_unknowns), dtype=bool)  # other dofs, by T
+    free_jump = np.zeros_like(follows)
+    for link, role in zip(links, roles, strict=True):
+        follows[link.nodes, :gdim] = True
+        free_jump[link.nodes, :gdim] = role[link.slaves] == FREE
+    local = layout.dofs(nodes.local)
+    follows_here = follows[nodes.mine]
+    own[local[follows_here]] = free_jump[nodes.mine][follows_here]
 
     index, n_retained = [], 0
     for role in roles:
@@ -132,30 +164,29 @@ def build_coordinates(
         index.append(number)
     n_supports = len(supports.columns)
     n_inner = int(own.sum())
-    counts = comm.allgather(n_inner)
+    counts = np.zeros(comm.size, dtype=np.int64)
+    comm.Allgather(np.array([n_inner], dtype=np.int64), counts)
     extra = n_retained + n_supports + n_borders
-    first = counts[0]
-    start = sum(counts[: comm.rank]) + (extra if comm.rank > 0 else 0)
-    n_columns = sum(counts) + extra
-    column = np.full(continuum.n_local, -1, dtype=np.int64)
+    first = int(counts[0])
+    start = int(counts[: comm.rank].sum()) + (extra if comm.rank > 0 else 0)
+    n_columns = int(counts.sum()) + extra
+    column = np.full(layout.n_local, -1, dtype=np.int64)
     column[own] = start + np.arange(n_inner)
-    shared = replica.share(column[mine].astype(float)).astype(np.int64)
 
     rows = _interface_rows(
-        replica,
-        pairs,
-        slaves,
-        paired,
+        nodes,
+        links,
         frames,
-        index,
-        is_slave,
-        shared,
-        first,
-        n_retained,
+        [np.where(number < 0, -1, first + number) for number in index],
+        follows,
+        nodes.share(column[local]),
+        np.where(which < 0, -1, first + n_retained + which),
+        value,
         n_columns,
     )
+    mine = layout.dofs(np.arange(len(nodes))[nodes.mine])
     transform = _assemble(
-        continuum, supports, replica, is_slave, mine, column, rows, first + n_retained,
+        layout, supports, column, local[follows_here], rows[mine[follows_here]], first + n_retained,
         (n_inner + (extra if comm.rank == 0 else 0), n_columns),
     )  # fmt: skip
     return JumpCoordinates(
@@ -164,45 +195,67 @@ def build_coordinates(
     )  # fmt: skip
 
 
+@dataclass(frozen=True)
+class _Link:
+    """Slave nodes of a pair that have a jump.
+
+    Attributes:
+        pair: The pair.
+        slaves: Which of its slave nodes, shape (n,).
+        nodes: Their rows among the interface nodes, shape (n,).
+    """
+
+    pair: Pair
+    slaves: Ints
+    nodes: Ints
+
+
 def _interface_rows(
-    replica: InterfaceNodes,
-    pairs: list[Pair],
-    slaves: list[Ints],
-    paired: list[Ints],
-    frames: list[Array],
-    index: list[Ints],
-    is_slave: npt.NDArray[np.bool_],
-    shared: Ints,
-    first: int,
-    n_retained: int,
+    nodes: InterfaceNodes,
+    links: Sequence[_Link],
+    frames: Sequence[Array],
+    retained: Sequence[Ints],
+    follows: Bools,
+    column: Ints,
+    support: Ints,
+    value: Array,
     n_columns: int,
 ) -> sp.csr_matrix:
-    """Rows of T for all interface dofs, chains composed, shape (gdim n_blocks, n_columns)."""
-    gdim = replica.gdim
-    n = gdim * len(replica.blocks)
-    slave_flat = is_slave.ravel()
-    column, which, value = shared.ravel(), replica.which.ravel(), replica.value.ravel()
-    base_rows = np.flatnonzero(~slave_flat & (column >= 0))
+    """Rows of T for the dofs of all interface nodes, chains composed.
+
+    Args:
+        nodes: The interface nodes.
+        links: Slave nodes that have a jump, per pair.
+        frames: Frames of slave nodes per pair, shape (n_nodes, gdim, gdim).
+        retained: Columns of retained jumps per pair, -1 for others, shape (n_nodes, gdim).
+        follows: Dofs that follow other dofs, shape (n_interface_nodes, n_unknowns).
+        column: Columns of the dofs' own, -1 where they have none, same shape.
+        support: Columns of the supports that prescribe dofs, -1 where none does, same shape.
+        value: Entries of these columns, same shape.
+        n_columns: Columns of T.
+
+    Returns:
+        Shape (n_unknowns n_interface_nodes, n_columns).
+
+    Raises:
+        InterfaceError: Slaves and masters form a cycle.
+    """
+    layout = nodes.layout
+    n = layout.n_unknowns * len(nodes)
+    follows_flat, own, prescribed = follows.ravel(), column.ravel(), support.ravel()
+    rows = np.flatnonzero(~follows_flat & (own >= 0))
     # a supported component of a slave moves like its masters', but its reaction is its own
-    held_rows = np.flatnonzero(which >= 0)
-    entries = [
-        (base_rows, column[base_rows], np.ones(len(base_rows))),
-        (held_rows, first + n_retained + which[held_rows], value[held_rows]),
-    ]
-    links = []
-    for pair, s, k, frame, number in zip(pairs, slaves, paired, frames, index, strict=True):
-        masters = replica.find(pair.masters[k])
-        weights = pair.weights[k]
-        for c in range(gdim):
-            row = np.broadcast_to((gdim * s[k] + c)[:, None], masters.shape)
-            follows = np.where(replica.which[s[k], c] < 0, 1.0, 0.0)[:, None] * weights
-            links.append((row.ravel(), (gdim * masters + c).ravel(), follows.ravel()))
-        for j in range(gdim):
-            inner = column[gdim * s[k] + j]
-            target = np.where(number[k, j] >= 0, first + number[k, j], inner)
+    held = np.flatnonzero(prescribed >= 0)
+    entries = [(rows, own[rows], np.ones(len(rows))), (held, prescribed[held], value.ravel()[held])]
+    followed: list[tuple[Ints, Ints, Array]] = []
+    for link, frame, jumps in zip(links, frames, retained, strict=True):
+        k, s = link.slaves, link.nodes
+        followed += _followed_unknowns(nodes, link, support[s] < 0)
+        for j in range(layout.gdim):
+            target = np.where(jumps[k, j] >= 0, jumps[k, j], column[s, j])
             has = target >= 0
-            for c in range(gdim):
-                entries.append((gdim * s[k][has] + c, target[has], frame[k, c, j][has]))
+            for c in range(layout.gdim):
+                entries.append((layout.dof(s[has], c), target[has], frame[k, c, j][has]))
 
     def matrix(parts: list[tuple[Ints, Ints, Array]], width: int) -> sp.csr_matrix:
         r, c, v = (np.concatenate(p) for p in zip(*parts, strict=True))
@@ -210,62 +263,97 @@ def _interface_rows(
         return sp.csr_matrix((v[keep], (r[keep], c[keep])), shape=(n, width))
 
     base = matrix(entries, n_columns)
-    if not links:
+    if not followed:
         return base
-    chain = matrix(links, n)
-    inside = chain[slave_flat][:, slave_flat]
+    chain = matrix(followed, n)
+    inside = chain[follows_flat][:, follows_flat]
     groups, _ = connected_components(inside, directed=True, connection="strong")
     if groups < inside.shape[0] or inside.diagonal().any():
-        names = ", ".join(f"'{p.title}'" for p in pairs)
+        names = ", ".join(f"'{link.pair.title}'" for link in links)
         raise InterfaceError(
             f"interfaces {names} form a cycle: a slave node is master of a node that is in turn "
             "its master; exchange slave and master of one of them"
         )
-    rows = base
-    for _ in range(len(pairs)):
-        rows = base + chain @ rows
-    return sp.csr_matrix(rows)
+    composed = base
+    for _ in range(len(links)):
+        composed = base + chain @ composed
+    return sp.csr_matrix(composed)
+
+
+def _followed_unknowns(
+    nodes: InterfaceNodes, link: _Link, free: Bools
+) -> list[tuple[Ints, Ints, Array]]:
+    """Blocks W P_m of the masters and -Z_s of the slaves themselves, as rows, columns, entries.
+
+    Args:
+        nodes: The interface nodes, in whose order rows and columns are numbered.
+        link: Slave nodes of a pair.
+        free: Their unknowns that no support prescribes, shape (n, n_unknowns).
+    """
+    layout, pair, k = nodes.layout, link.pair, link.slaves
+    masters, slave_maps = nodes.find(pair.masters[k]), pair.surface.point_maps
+    out = []
+    for c in range(layout.gdim):
+        row = layout.dof(link.nodes, c)
+        follows = np.where(free[:, c], 1.0, 0.0)
+        weights = follows[:, None] * pair.weights[k]
+        blocks = [(c, weights)]
+        if pair.master_maps is not None:
+            maps = pair.master_maps[k, :, c]
+            blocks = [(j, weights * maps[..., j]) for j in range(layout.n_unknowns)]
+        rows = np.broadcast_to(row[:, None], masters.shape).ravel()
+        out += [(rows, layout.dof(masters, j).ravel(), block.ravel()) for j, block in blocks]
+        if slave_maps is not None:
+            out += [
+                (row, layout.dof(link.nodes, j), -follows * slave_maps[k, c, j])
+                for j in range(layout.gdim, layout.n_unknowns)
+            ]
+    return out
 
 
 def _assemble(
-    continuum: Continuum,
+    layout: DofLayout,
     supports: Supports,
-    replica: InterfaceNodes,
-    is_slave: npt.NDArray[np.bool_],
-    mine: Ints,
     column: Ints,
+    followers: Ints,
     rows: sp.csr_matrix,
     support_column: int,
     size: tuple[int, int],
 ) -> PETSc.Mat:
-    """T from the single-entry rows of ordinary dofs and the interface rows of slaves."""
-    gdim, n_local = continuum.gdim, continuum.n_local
-    slave_here = is_slave[replica.mine]
-    local = mine[slave_here]
-    global_rows = (gdim * replica.mine[:, None] + np.arange(gdim))[slave_here]
+    """T from the single-entry rows of ordinary dofs and the rows of dofs that follow others.
+
+    Args:
+        layout: Unknowns of nodes and their numbers.
+        supports: Prescribed components.
+        column: Column of each owned dof's own, -1 where it has none, shape (n_local,).
+        followers: Owned dofs that follow others, shape (n_followers,).
+        rows: Their rows, shape (n_followers, n_columns).
+        support_column: First column of the supports.
+        size: Columns that this rank owns, and all columns.
+    """
     single = (supports.which >= 0) | (column >= 0)
-    single[local] = False
+    single[followers] = False
     r = np.flatnonzero(single)
     held = supports.which[r] >= 0
     c = np.where(held, support_column + supports.which[r], column[r])
     v = np.where(held, supports.value[r], 1.0)
-    block = rows[global_rows].tocoo()
+    block = rows.tocoo()
     csr = sp.csr_matrix(
         (
             np.concatenate([v, block.data]),
-            (np.concatenate([r, local[block.row]]), np.concatenate([c, block.col])),
+            (np.concatenate([r, followers[block.row]]), np.concatenate([c, block.col])),
         ),
-        shape=(n_local, size[1]),
+        shape=(layout.n_local, size[1]),
     )
     csr.sort_indices()
     transform = PETSc.Mat().createAIJ(
-        ((n_local, continuum.n_global), size),
+        ((layout.n_local, layout.n_global), size),
         csr=(
             csr.indptr.astype(PETSc.IntType),
             csr.indices.astype(PETSc.IntType),
             csr.data.astype(PETSc.ScalarType),
         ),
-        comm=continuum.comm,
+        comm=layout.comm,
     )
     transform.assemble()
     return transform

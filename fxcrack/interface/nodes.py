@@ -1,124 +1,169 @@
-"""Displacements of the interface nodes, whole on every rank.
+"""Displacements and jumps of the interface nodes, whole on every rank.
 
-delta = R^t (u_s - sum_m W_sm u_m)
+    delta = R^t (u_s - sum_m W_sm u_m),    u = P q_node at the points of both surfaces
+
+(:mod:`fxcrack.interface.jump_coordinates`). The nodes are sorted by their global numbers, of which
+each rank owns a range; so the values of the ranks, one rank after the other, are those of all
+nodes. They are exchanged by buffers in one call.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.surface import FacetSurface
 
 
-class NodeValues:
-    """Values at some displacement nodes, gathered from their owners.
+class InterfaceNodes:
+    """Some displacement nodes, the same on every rank, and the exchange of their values.
 
     Args:
-        continuum: Displacement space.
-        nodes: Global displacement nodes (block indices), any order, repeated or not.
+        layout: Unknowns of nodes and their numbers.
+        nodes: Global nodes, any order, repeated or not; the same on every rank.
+
+    Attributes:
+        layout: The layout.
+        nodes: The nodes, ascending, shape (n_nodes,).
+        mine: Rows of ``nodes`` that this rank owns.
+        local: Numbers of these nodes on this rank, shape (n_mine,).
     """
 
-    def __init__(self, continuum: Continuum, nodes: Ints) -> None:
+    def __init__(self, layout: DofLayout, nodes: Ints) -> None:
+        self.layout = layout
         self.nodes = np.unique(nodes)
-        self._gdim, self._comm = continuum.gdim, continuum.comm
-        low = continuum.offset // continuum.gdim
-        mine = (self.nodes >= low) & (self.nodes < low + continuum.n_local // continuum.gdim)
-        self._here = np.flatnonzero(mine)
-        self._local = self.nodes[mine] - low
+        ends = np.searchsorted(self.nodes, layout.first_nodes)
+        self._counts, self._starts = np.diff(ends), ends[:-1]
+        rank = layout.comm.rank
+        self.mine = slice(int(ends[rank]), int(ends[rank + 1]))
+        self.local = layout.to_local(self.nodes[self.mine])
 
-    def gather(self, owned: Array) -> Array:
-        """Values at the nodes, shape (n_nodes, gdim); collective.
+    @classmethod
+    def of_pairs(
+        cls,
+        layout: DofLayout,
+        pairs: Sequence[Pair],
+        masters: Sequence[FacetSurface] = (),
+        jumped: Sequence[npt.NDArray[np.bool_]] | None = None,
+    ) -> InterfaceNodes:
+        """Nodes of interfaces.
 
         Args:
-            owned: Values on the owned dofs of this rank, shape (n_local,).
+            layout: Unknowns of nodes and their numbers.
+            pairs: Interfaces; their slave nodes and the masters of these.
+            masters: Master surfaces, all of whose nodes are wanted as well.
+            jumped: Per pair, the slave nodes that count, shape (n_nodes,); all by default.
         """
-        out = np.zeros((len(self.nodes), self._gdim))
-        mine = owned.reshape(-1, self._gdim)[self._local]
-        for here, values in self._comm.allgather((self._here, mine)):
-            out[here] = values
-        return out
+        every = slice(None)
+        used = [m.dofs for m in masters]
+        for p, pair in enumerate(pairs):
+            rows = every if jumped is None else jumped[p]
+            used += [pair.surface.dofs[rows], pair.masters[rows].ravel()]
+        return cls(layout, np.concatenate(used) if used else np.zeros(0, dtype=np.int64))
+
+    def __len__(self) -> int:
+        """Number of nodes."""
+        return len(self.nodes)
 
     def find(self, nodes: Ints) -> Ints:
-        """Rows of :meth:`gather` for some of the nodes."""
+        """Rows of some of the nodes, shape of ``nodes``."""
         return np.searchsorted(self.nodes, nodes)
+
+    def gather(self, owned: Array) -> Array:
+        """Values of the nodes' unknowns; collective.
+
+        Args:
+            owned: Values of the dofs that this rank owns, shape (n_local,).
+
+        Returns:
+            Shape (n_nodes, n_unknowns).
+        """
+        return np.asarray(self.share(self.layout.by_node(owned)[self.local]))
+
+    def share(self, mine: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        """What all ranks know of the nodes they own; collective.
+
+        Args:
+            mine: Numbers of this rank's nodes, of any type, shape (n_mine, ...).
+
+        Returns:
+            The same of all nodes, shape (n_nodes, ...).
+        """
+        comm = self.layout.comm
+        out = np.empty((len(self.nodes), *mine.shape[1:]), dtype=mine.dtype)
+        if comm.size == 1:
+            out[:] = mine
+            return out
+        width = int(np.prod(mine.shape[1:]))
+        whole = (out, (width * self._counts, width * self._starts))
+        comm.Allgatherv(np.ascontiguousarray(mine), whole)
+        return out
 
 
 class JumpGather:
-    """Reads the jumps of all pairs off a displacement.
+    """Reads the jumps of all pairs in a displacement.
 
     Args:
-        continuum: Displacement space.
+        layout: Unknowns of nodes and their numbers.
         pairs: Interfaces.
         masters: Master surfaces whose nodes are wanted as well.
     """
 
     def __init__(
-        self, continuum: Continuum, pairs: list[Pair], masters: Sequence[FacetSurface] = ()
+        self, layout: DofLayout, pairs: Sequence[Pair], masters: Sequence[FacetSurface] = ()
     ) -> None:
-        nodes = [p.surface.dofs for p in pairs] + [m.dofs for m in masters]
-        nodes += [p.masters.ravel() for p in pairs]
-        self.values = NodeValues(
-            continuum, np.concatenate(nodes) if nodes else np.zeros(0, dtype=np.int64)
-        )
+        self._nodes = InterfaceNodes.of_pairs(layout, pairs, masters)
 
-    def slaves(self, values: Array, pair: Pair) -> Array:
-        """Displacements of a pair's slave nodes, shape (n_nodes, gdim)."""
-        return values[self.values.find(pair.surface.dofs)]
+    def gather(self, owned: Array) -> Array:
+        """Values for the other methods, shape (n_nodes, n_unknowns); collective.
+
+        Args:
+            owned: Values of the dofs that this rank owns, shape (n_local,).
+        """
+        return self._nodes.gather(owned)
+
+    def displacements(self, values: Array, surface: FacetSurface) -> Array:
+        """Displacements of the points of a surface, shape (n_nodes, gdim), length.
+
+        Args:
+            values: From :meth:`gather`.
+            surface: Slave surface of a pair, or one of the master surfaces.
+        """
+        return point_displacements(values[self._nodes.find(surface.dofs)], surface.point_maps)
 
     def jumps(self, values: Array, pair: Pair, frames: Array) -> Array:
-        """Jumps of a pair in its frames, shape (n_nodes, gdim); of paired nodes only."""
-        masters = values[self.values.find(pair.masters)]
-        jump = self.slaves(values, pair) - np.einsum("nk,nkc->nc", pair.weights, masters)
+        """Jumps of a pair in its frames; zero at nodes without a master point.
+
+        Args:
+            values: From :meth:`gather`.
+            pair: Interface.
+            frames: Frames of the slave nodes, shape (n_nodes, gdim, gdim).
+
+        Returns:
+            Shape (n_nodes, gdim), length.
+        """
+        masters = point_displacements(values[self._nodes.find(pair.masters)], pair.master_maps)
+        jump = self.displacements(values, pair.surface)
+        jump = jump - np.einsum("nk,nkc->nc", pair.weights, masters)
         jump[~pair.paired] = 0.0
         return np.asarray(np.einsum("nci,nc->ni", frames, jump))
 
 
-class InterfaceNodes:
-    """What every rank knows of the displacement nodes that take part in an interface.
+def point_displacements(values: Array, maps: Array | None) -> Array:
+    """Displacements of surface points.
 
     Args:
-        continuum: Displacement space.
-        pairs: Interfaces.
-        which: Number of the support that prescribes a dof, -1 where none does, shape (n_local,).
-        value: Values that supports prescribe, shape (n_local,).
-        jumped: Per pair, whether a slave node has a jump, shape (n_nodes,).
+        values: Unknowns of their nodes, shape (..., n_unknowns).
+        maps: P at the points, shape (..., gdim, n_unknowns); ``None`` where the unknowns are the
+            displacement.
+
+    Returns:
+        Shape (..., gdim), length.
     """
-
-    def __init__(
-        self,
-        continuum: Continuum,
-        pairs: list[Pair],
-        which: Ints,
-        value: Array,
-        jumped: list[npt.NDArray[np.bool_]],
-    ) -> None:
-        gdim, comm = continuum.gdim, continuum.comm
-        used = [p.surface.dofs[j] for p, j in zip(pairs, jumped, strict=True)]
-        used += [p.masters[j].ravel() for p, j in zip(pairs, jumped, strict=True)]
-        self.blocks = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
-        self.gdim = gdim
-        self.low = continuum.offset // gdim
-        self.mine = np.flatnonzero(
-            (self.blocks >= self.low) & (self.blocks < self.low + continuum.n_local // gdim)
-        )
-        self.comm = comm
-        local = (self.blocks[self.mine] - self.low)[:, None] * gdim + np.arange(gdim)
-        self.which = self.share(which[local].astype(float)).astype(np.int64)
-        self.value = self.share(value[local])
-
-    def share(self, mine: Array) -> Array:
-        """Combine what owners know of their nodes, shape (n_mine, gdim) to (n_blocks, gdim)."""
-        out = np.zeros((len(self.blocks), self.gdim))
-        for where, what in self.comm.allgather((self.mine, mine)):
-            out[where] = what
-        return out
-
-    def find(self, dofs: Ints) -> Ints:
-        """Position of global displacement nodes in the replica."""
-        return np.searchsorted(self.blocks, dofs)
+    return values if maps is None else np.asarray(np.einsum("...cj,...j->...c", maps, values))

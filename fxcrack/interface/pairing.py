@@ -120,6 +120,9 @@ class Pair:
         gap: Initial normal gap, shape (n_nodes,), length.
         bonded: Initially bonded nodes, shape (n_nodes,).
         friction: Coefficient of friction per slave node, shape (n_nodes,); ``None`` without.
+        master_maps: Displacement of a master's point per unknown of its node, shape
+            (n_nodes, k, gdim, n_unknowns); ``None`` where the unknowns are the displacement
+            (:mod:`fxcrack.continuum.dof_layout`).
     """
 
     interface: Interface
@@ -131,11 +134,26 @@ class Pair:
     gap: Array
     bonded: Bools
     friction: Array | None = None
+    master_maps: Array | None = None
 
     @property
     def title(self) -> str:
         """Name in the history."""
         return self.interface.title
+
+    def forces_on_masters(self, forces: Array) -> Array:
+        """Forces on the masters' unknowns that do the work of given forces on the slave side.
+
+        Args:
+            forces: On the slave nodes' displacements, shape (n_nodes, gdim), force.
+
+        Returns:
+            W P_m^t f of each master, shape (n_nodes, k, n_unknowns).
+        """
+        each = self.weights[:, :, None] * forces[:, None, :]
+        if self.master_maps is None:
+            return each
+        return np.asarray(np.einsum("nkc,nkcj->nkj", each, self.master_maps))
 
 
 def check_coefficients(mu: Array, where: str) -> None:
@@ -293,24 +311,25 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
         raise InterfaceError(
             f"{where}: {int(lost.sum())} bonded slave nodes lie outside the master surface "
             f"'{interface.master}', the farthest at {format_point(slave.x[i])} by "
-            f"{foot.distance[i]:.3g} (search tolerance {tolerance:.3g}); let the master "
-            "surface extend under them, take them out of the bonded set, or raise "
-            "Interface(tolerance=...)"
+            f"{foot.distance[i]:.3g} (search tolerance {tolerance:.3g}); let the master surface "
+            "extend under them, take them out of the bonded set, or raise Interface(tolerance=...)"
         )
     normals = np.where(slave.order >= 1, -slave.normals, 0.0)
     gap = np.einsum("ni,ni->n", slave.x - foot.foot, normals)
     if interface.gap == "adjust":
         gap = np.zeros(len(gap))
+    nodes = master.facets[foot.facet]
     return Pair(
         interface=interface,
         surface=slave,
         paired=paired,
-        masters=master.dofs[master.facets[foot.facet]],
+        masters=master.dofs[nodes],
         weights=foot.weights,
         frames=local_frames(normals, continuum.gdim),
         gap=gap,
         bonded=bonded,
         friction=friction_of(interface, slave),
+        master_maps=master.maps_at(nodes),
     )
 
 

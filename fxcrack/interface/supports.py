@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -55,6 +56,19 @@ class Supports:
     which: Ints
     value: Array
 
+    def at_nodes(self, nodes: InterfaceNodes) -> tuple[Ints, Array]:
+        """Supports of the interface nodes' unknowns; collective.
+
+        Args:
+            nodes: The interface nodes.
+
+        Returns:
+            Column number, -1 where free, and entry of that column, each of shape
+            (n_nodes, n_unknowns).
+        """
+        dofs = nodes.layout.dofs(nodes.local)
+        return nodes.share(self.which[dofs]), nodes.share(self.value[dofs])
+
 
 def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supports:
     """Number the prescribed components and place them on the dofs; collective.
@@ -62,9 +76,9 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
     Raises:
         InputError: Two supports prescribe different values for one dof, or a value is not finite.
     """
-    gdim = continuum.gdim
-    which = np.full(continuum.n_local, -1, dtype=np.int64)
-    value = np.zeros(continuum.n_local)
+    gdim, layout = continuum.gdim, continuum.layout
+    which = np.full(layout.n_local, -1, dtype=np.int64)
+    value = np.zeros(layout.n_local)
     columns: list[SupportColumn] = []
     problem = None
     x = continuum.positions()
@@ -78,7 +92,7 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
                 raise InputError(
                     f"Displacement('{support.title}') prescribes {axis} in {gdim} dimensions"
                 )
-            dofs = gdim * nodes.astype(np.int64) + component
+            dofs = layout.dof(nodes, component)
             values = np.broadcast_to(
                 np.asarray(field(x[nodes].T) if callable(field) else field, dtype=float),
                 (len(nodes),),
@@ -131,7 +145,7 @@ def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
 
 
 def align_frames(
-    pairs: list[Pair],
+    pairs: Sequence[Pair],
     which: list[Ints],
     jumped: list[npt.NDArray[np.bool_]],
     supports: Supports,
@@ -193,15 +207,32 @@ def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -
 
 
 def check_slaves(
-    pairs: list[Pair],
+    pairs: Sequence[Pair],
     jumped: list[npt.NDArray[np.bool_]],
-    replica: InterfaceNodes,
+    nodes: InterfaceNodes,
+    which: Ints,
+    value: Array,
     supports: Supports,
 ) -> None:
-    """Enforce the rules of design.md, section 2; the same verdict on every rank.
+    """Refuse slave nodes for which no jump can be defined; the same verdict on every rank.
 
-    Open nodes whose support their masters do not share lose their jump: they cannot be bonded
-    or touch, but nothing else is lost. ``jumped`` is changed in place.
+    A node is a slave once only, and where a support holds a displacement component of a bonded
+    slave node, it holds that of the masters in the same way
+    (:mod:`fxcrack.interface.jump_coordinates`). Open nodes whose support their masters do not share
+    lose their jump: they cannot be bonded or touch, but nothing else is lost.
+
+    Args:
+        pairs: Interfaces.
+        jumped: Per pair, the slave nodes that have a jump, shape (n_nodes,); changed in place.
+        nodes: The interface nodes.
+        which: Support column of each of their unknowns, -1 if free, shape
+            (n_interface_nodes, n_unknowns).
+        value: Entry of that column, same shape.
+        supports: For the titles in messages.
+
+    Raises:
+        InterfaceError: A node is a slave twice, or a support holds a bonded slave node but not
+            its masters.
     """
     seen: dict[int, str] = {}
     for pair, taking_part in zip(pairs, jumped, strict=True):
@@ -214,11 +245,16 @@ def check_slaves(
                     "let the surfaces end before each other or exchange slave and master of one"
                 )
             seen[dof] = pair.title
-        slave = replica.find(pair.surface.dofs)
+        slave = nodes.find(pair.surface.dofs)
         supported = taking_part.copy()
-        supported[taking_part] = (replica.which[slave[taking_part]] >= 0).any(axis=1)
+        displacement = which[slave[taking_part], : nodes.layout.gdim]
+        supported[taking_part] = (displacement >= 0).any(axis=1)
         for node in np.flatnonzero(supported):
-            column = _unshared_support(pair, int(node), int(slave[node]), replica, supports)
+            masters = nodes.find(pair.masters[node][pair.weights[node] != 0.0])
+            column = _unshared_support(
+                which[slave[node], : nodes.layout.gdim], value[slave[node]],
+                which[masters], value[masters], supports,
+            )  # fmt: skip
             if column is None:
                 continue
             if pair.bonded[node]:
@@ -239,16 +275,20 @@ def check_slaves(
 
 
 def _unshared_support(
-    pair: Pair, node: int, slave: int, replica: InterfaceNodes, supports: Supports
+    which: Ints, value: Array, master_which: Ints, master_value: Array, supports: Supports
 ) -> SupportColumn | None:
-    """A support of a slave node that its masters do not carry in the same way."""
-    masters = replica.find(pair.masters[node][pair.weights[node] != 0.0])
-    for c in np.flatnonzero(replica.which[slave] >= 0):
-        column: SupportColumn = supports.columns[int(replica.which[slave, c])]
-        for m in masters:
-            k = replica.which[m, c]
-            if k < 0 or not _moves_alike(
-                supports.columns[k], column, replica.value[m, c], replica.value[slave, c]
-            ):
+    """A support of a slave node's displacement that its masters do not have in the same way.
+
+    Args:
+        which: Support columns of the node's displacement, -1 if free, shape (gdim,).
+        value: Entries of these columns, shape (gdim,) or longer.
+        master_which: Support columns of its masters, shape (k, n_unknowns).
+        master_value: Entries of these columns, same shape.
+        supports: The columns.
+    """
+    for c in np.flatnonzero(which >= 0):
+        column = supports.columns[int(which[c])]
+        for k, at_master in zip(master_which[:, c], master_value[:, c], strict=True):
+            if k < 0 or not _moves_alike(supports.columns[k], column, at_master, value[c]):
                 return column
     return None

@@ -11,6 +11,7 @@ from functools import cached_property, lru_cache
 
 import basix
 import numpy as np
+import numpy.typing as npt
 
 from fxcrack.base import compat
 from fxcrack.base.arrays import Array, Ints
@@ -63,6 +64,9 @@ class FacetSurface:
         breadth: Out-of-plane extent at the nodes (1 in 3-D), shape (n_nodes,).
         outward: Sign that turns each facet's own area vector outward, shape (n_facets,); found
             from ``inner`` where it is not given.
+        point_maps: Displacement of each node's point per unknown of the node, shape
+            (n_nodes, gdim, n_unknowns); ``None`` where the unknowns are the displacement
+            (:mod:`fxcrack.continuum.dof_layout`).
     """
 
     name: str
@@ -74,6 +78,7 @@ class FacetSurface:
     inner: Array
     breadth: Array
     outward: Array | None = None
+    point_maps: Array | None = None
 
     @property
     def n_nodes(self) -> int:
@@ -126,6 +131,10 @@ class FacetSurface:
         own, _ = replace(self, outward=np.ones(len(self.facets))).facet_normals(centre)
         return replace(self, x=x, outward=np.sign(np.einsum("fc,fc->f", unit[:, 0], own[:, 0])))
 
+    def maps_at(self, nodes: Ints) -> Array | None:
+        """``point_maps`` of some nodes, shape (..., gdim, n_unknowns)."""
+        return None if self.point_maps is None else np.asarray(self.point_maps[nodes])
+
     @cached_property
     def normals(self) -> Array:
         """Outward unit normals at the nodes, averaged by area, shape (n_nodes, 3)."""
@@ -175,60 +184,78 @@ def _closure_table(cell: basix.CellType, order: int) -> tuple[str, Ints]:
     return kind, np.asarray(table, dtype=np.int64)
 
 
+def facet_nodes(
+    continuum: Continuum, facets: npt.NDArray[np.int32]
+) -> tuple[str, npt.NDArray[np.int32], Ints, npt.NDArray[np.int32]]:
+    """Facets of this rank as parts of a cell.
+
+    Args:
+        continuum: Displacement space.
+        facets: Facets of this rank, shape (n_facets,).
+
+    Returns:
+        The kind of facet ("interval", "triangle", "quadrilateral"); the first cell at each facet
+        and the facet's number in this cell, both of shape (n_facets,); and the displacement nodes
+        of this rank on it in basix order, shape (n_facets, nodes_per_facet).
+    """
+    topology, tdim = continuum.mesh.domain.topology, continuum.mesh.tdim
+    topology.create_connectivity(tdim - 1, tdim)
+    topology.create_connectivity(tdim, tdim - 1)
+    to_cell, to_facet = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
+    cells = np.asarray(to_cell.array[to_cell.offsets[facets]], dtype=np.int32)
+    element = continuum.space.element.basix_element
+    kind, table = _closure_table(element.cell_type, continuum.order)
+    around = to_facet.array.reshape(-1, len(table))[cells]
+    local = np.argmax(around == facets[:, None], axis=1)
+    nodes = continuum.space.dofmap.list[cells[:, None], table[local]]
+    return kind, cells, local, nodes
+
+
 def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
     """Collect a facet group on every rank; collective.
+
+    Args:
+        continuum: Displacement space.
+        name: Facet group.
+
+    Returns:
+        The surface, the same on every rank.
 
     Raises:
         InterfaceError: The group is empty or some of its facets lie inside the body.
     """
     domain, tdim = continuum.mesh.domain, continuum.mesh.tdim
-    topology = domain.topology
-    group = continuum.mesh.group(name, dim=tdim - 1).entities
-    topology.create_connectivity(tdim - 1, tdim)
-    topology.create_connectivity(tdim, tdim - 1)
-    to_cell = topology.connectivity(tdim - 1, tdim)
-    to_facet = topology.connectivity(tdim, tdim - 1)
-    n_cells = topology.index_map(tdim).size_local
-    cells, local = [], []
-    inside = 0
-    for facet in group:
-        attached = to_cell.links(facet)
-        inside += len(attached) > 1
-        cell = attached[0]
-        if cell < n_cells:
-            cells.append(cell)
-            local.append(int(np.flatnonzero(to_facet.links(cell) == facet)[0]))
+    facets = continuum.mesh.group(name, dim=tdim - 1).entities
+    kind, cells, local, nodes = facet_nodes(continuum, facets)
+    offsets = domain.topology.connectivity(tdim - 1, tdim).offsets
     problem = None
-    if inside:
+    if np.any(offsets[facets + 1] - offsets[facets] > 1):
         problem = (
             f"facet group '{name}' has facets inside the body; slave and master surfaces must be "
             "boundaries: mesh the two sides apart, or split the mesh there (fxcrack.Split)"
         )
     raise_on_all_ranks(continuum.comm, problem, InterfaceError)
 
-    element = continuum.space.element.basix_element
-    kind, table = _closure_table(element.cell_type, continuum.order)
-    cells_array = np.asarray(cells, dtype=np.int64)
-    local_array = np.asarray(local, dtype=np.int64)
-    dofmap = continuum.space.dofmap.list
-    dofs = dofmap[cells_array[:, None], table[local_array]]
+    here = cells < domain.topology.index_map(tdim).size_local
+    cells, local, nodes = cells[here], local[here], nodes[here]
     index_map = continuum.space.dofmap.index_map
-    blocks = np.asarray(index_map.local_to_global(dofs.ravel().astype(np.int32)), dtype=np.int64)
-    geometry = compat.geometry_dofmap(domain)
-    x = domain.geometry.x
-    inner = np.asarray([x[geometry[c]].mean(axis=0) for c in cells]).reshape(-1, 3)
-    key = np.asarray(compat.original_cell_index(domain), dtype=np.int64)[cells_array]
-    mine = (
-        key,
-        local_array,
-        blocks.reshape(dofs.shape),
-        continuum.positions()[dofs],
-        inner,
-    )
+    blocks = np.asarray(index_map.local_to_global(nodes.ravel()), dtype=np.int64)
+    mine = [
+        np.asarray(compat.original_cell_index(domain), dtype=np.int64)[cells],
+        local,
+        blocks.reshape(nodes.shape),
+        continuum.positions()[nodes],
+        domain.geometry.x[compat.geometry_dofmap(domain)[cells]].mean(axis=1),
+    ]
+    maps = continuum.layout.point_maps(name, nodes)
+    if maps is not None:
+        mine.append(maps)
     parts = [p for p in continuum.comm.allgather(mine) if len(p[0])]
     if not parts:
         raise InterfaceError(f"facet group '{name}' of mesh '{continuum.mesh.name}' is empty")
-    key, which, blocks, points, inner = (np.concatenate(c) for c in zip(*parts, strict=True))
+    key, which, blocks, points, inner, *maps_of = (
+        np.concatenate(c) for c in zip(*parts, strict=True)
+    )
     order = np.lexsort((which, key))
     blocks, points, inner = blocks[order], points[order], inner[order]
     unique, first, inverse = np.unique(blocks.ravel(), return_index=True, return_inverse=True)
@@ -237,6 +264,11 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
     position[rank] = points.reshape(-1, 3)[first]
     node_dofs = np.empty(len(unique), dtype=np.int64)
     node_dofs[rank] = unique
+    point_maps = None
+    for found in maps_of:
+        by_corner = found[order].reshape(-1, *found.shape[2:])
+        point_maps = np.empty((len(unique), *found.shape[2:]))
+        point_maps[rank] = by_corner[first]
     surface = FacetSurface(
         name=name,
         kind=kind,
@@ -246,6 +278,7 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
         facets=rank[inverse].reshape(blocks.shape),
         inner=inner,
         breadth=continuum.model.breadth(position),
+        point_maps=point_maps,
     )
     _check_facets(surface)
     return surface

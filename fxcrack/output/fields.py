@@ -81,7 +81,7 @@ def body_grid(analysis: Analysis, u: fem.Function, time: float) -> Grid:
         points=np.asarray(x)[nodes],
         cells=renumbered.reshape(cells.shape),
         kind=int(kinds[0]) if len(kinds) else 0,
-        point_data={"displacement": in_space(u.x.array.reshape(-1, continuum.gdim)[nodes])},
+        point_data={"displacement": in_space(continuum.layout.displacements(u.x.array)[nodes])},
         cell_data={
             "stress": stress.x.array.reshape(-1, len(labels))[of_cell][:, order],
             "von_mises": equivalent.x.array[of_cell_scalar],

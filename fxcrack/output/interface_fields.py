@@ -18,9 +18,9 @@ import numpy as np
 import numpy.typing as npt
 from dolfinx import fem
 
-from fxcrack.base.arrays import Array, Ints
-from fxcrack.continuum.continuum import Continuum
+from fxcrack.base.arrays import Array
 from fxcrack.criteria.evaluator import TipValues
+from fxcrack.interface.nodes import InterfaceNodes, point_displacements
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 from fxcrack.steps.bond_records import bond_state
 
@@ -72,25 +72,6 @@ def residual(analysis: Analysis, u: fem.Function) -> Array:
     return values
 
 
-def _shared(continuum: Continuum, blocks: Ints, owned: Array) -> Array:
-    """Values of global displacement nodes on every rank, shape (n_blocks, gdim); collective.
-
-    Args:
-        continuum: Displacement space.
-        blocks: Global nodes, sorted, the same on every rank.
-        owned: Values of the owned dofs, shape (n_local,).
-    """
-    gdim = continuum.gdim
-    low, count = continuum.offset // gdim, continuum.n_local // gdim
-    mine = np.flatnonzero((blocks >= low) & (blocks < low + count))
-    out = np.zeros((len(blocks), gdim))
-    for where, what in continuum.comm.allgather(
-        (mine, owned.reshape(-1, gdim)[blocks[mine] - low])
-    ):
-        out[where] = what
-    return out
-
-
 def in_space(values: Array) -> Array:
     """Vectors with three components, shape (n, gdim) to (n, 3)."""
     return np.pad(values, ((0, 0), (0, 3 - values.shape[1])))
@@ -108,12 +89,11 @@ def interface_fields(
     """
     analysis = analysis_of(source)
     continuum, pairs = analysis.continuum, analysis.pairs
-    used = [np.concatenate([p.surface.dofs, p.masters.ravel()]) for p in pairs]
-    blocks = np.unique(np.concatenate(used)) if used else np.zeros(0, dtype=np.int64)
-    motion = _shared(continuum, blocks, u.x.array[: continuum.n_local])
-    direct = _shared(continuum, blocks, residual(analysis, u))
-    slaves = [np.searchsorted(blocks, p.surface.dofs) for p in pairs]
-    masters = [np.searchsorted(blocks, p.masters) for p in pairs]
+    nodes, gdim = InterfaceNodes.of_pairs(continuum.layout, pairs), continuum.gdim
+    motion = nodes.gather(u.x.array[: continuum.n_local])
+    direct = nodes.gather(residual(analysis, u))
+    slaves = [nodes.find(p.surface.dofs) for p in pairs]
+    masters = [nodes.find(p.masters) for p in pairs]
     acting = [
         pair.paired & (front.bonded | analysis.retained_nodes(p))
         for p, (pair, front) in enumerate(zip(pairs, analysis.solver.fronts, strict=True))
@@ -122,18 +102,18 @@ def interface_fields(
     for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
         carried = np.zeros_like(direct)
         for pair, s, m, on in zip(pairs, slaves, masters, acting, strict=True):
-            np.add.at(carried, m[on], pair.weights[on, :, None] * total[s[on], None, :])
+            np.add.at(carried, m[on], pair.forces_on_masters(total[s, :gdim])[on])
         total = direct + carried
     return [
         _fields_of(
             analysis,
             p,
-            motion[slaves[p]],
-            motion[masters[p]],
-            np.where(acting[p][:, None], total[slaves[p]], 0.0),
+            point_displacements(motion[slaves[p]], pair.surface.point_maps),
+            point_displacements(motion[masters[p]], pair.master_maps),
+            np.where(acting[p][:, None], total[slaves[p], :gdim], 0.0),
             analysis.time if time is None else time,
         )
-        for p in range(len(pairs))
+        for p, pair in enumerate(pairs)
     ]
 
 

@@ -213,7 +213,7 @@ class InterfaceSolver:
             return self._condense_by_columns(self.columns, roles)
         start = time.perf_counter()
         coordinates = build_coordinates(
-            self.continuum, self.pairs, roles, self.supports, len(self._borders)
+            self.continuum.layout, self.pairs, roles, self.supports, len(self._borders)
         )
         self.timings.add("transform", start)
         return coordinates

@@ -97,7 +97,9 @@ class CondensedTangent(LinearSolver):
             for p in self.pairs
         ]
         self._undeformed = [p.surface.x for p in self.pairs]
-        self._reader = JumpGather(continuum, self.pairs, [m for m in self.masters if m is not None])
+        self._reader = JumpGather(
+            continuum.layout, self.pairs, [m for m in self.masters if m is not None]
+        )
         self.at = 0.0
         self.pairing_energy = 0.0
         self.exact = False
@@ -209,7 +211,7 @@ class CondensedTangent(LinearSolver):
 
     def _jumps_from(self, u: PETSc.Vec) -> Array:
         """Jumps of the window in a displacement, shape (n_retained,); collective."""
-        values = self._reader.values.gather(u.array_r)
+        values = self._reader.gather(u.array_r)
         out = np.zeros(self.coordinates.n_retained)
         for pair, frames, index in zip(self.pairs, self.frames, self.index, strict=True):
             inside = index >= 0
@@ -220,10 +222,10 @@ class CondensedTangent(LinearSolver):
         """Take normals and lengths at the fronts from a displacement, if it is finite."""
         if not self._current:
             return
-        values = self._reader.values.gather(u.array_r)
+        values = self._reader.gather(u.array_r)
         for pair, front, x in zip(self.pairs, self.fronts, self._undeformed, strict=True):
             moved = x.copy()
-            moved[:, : self.continuum.gdim] += self._reader.slaves(values, pair)
+            moved[:, : self.continuum.gdim] += self._reader.displacements(values, pair.surface)
             front.follow(moved)
 
     @property
@@ -240,7 +242,7 @@ class CondensedTangent(LinearSolver):
         """
         if not self.follows_sliding:
             return False
-        values = self._reader.values.gather(self.u.array_r)
+        values = self._reader.gather(self.u.array_r)
         changed = False
         for p, master in enumerate(self.masters):
             if master is None:
@@ -250,8 +252,8 @@ class CondensedTangent(LinearSolver):
                 pair,
                 self.fronts[p].bonded,
                 master,
-                self._reader.slaves(values, pair),
-                values[self._reader.values.find(master.dofs)],
+                self._reader.displacements(values, pair.surface),
+                self._reader.displacements(values, master),
             )
             if new is not None:
                 self.pairs[p], changed = new, True

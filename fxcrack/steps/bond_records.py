@@ -29,7 +29,7 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class ReleaseRecord:
-    """One node that has let go.
+    """One node that was released.
 
     Attributes:
         node: Slave node.
@@ -53,7 +53,7 @@ class ReleaseRecord:
 def release_records(
     growth: Crack, nodes: Ints, values: TipValues, state: Equilibrium, time: float
 ) -> list[ReleaseRecord]:
-    """Records of nodes that are about to let go.
+    """Records of nodes that are about to be released.
 
     Args:
         growth: Their interface.
@@ -62,13 +62,9 @@ def release_records(
         state: Equilibrium before the release.
         time: Time.
     """
-    tips, solver = values.tips, growth.solver
-    opened = openings(solver, growth.p, tips, state)
-    index = solver.index[growth.p][nodes]
-    rows = np.unique(index[index >= 0])
-    held = np.zeros(solver.system.n_retained)
-    held[rows] = solver.system.forces(state, rows)
-    stresses = bond_stress(growth, nodes, held)
+    tips = values.tips
+    opened = openings(growth.probe, tips, state)
+    stresses = per_area(growth, nodes, growth.probe.bond_forces(nodes, state))
     out = []
     for node, stress in zip(nodes, stresses, strict=True):
         i = int(np.nonzero(tips.force_nodes == node)[0][0])
@@ -91,17 +87,17 @@ def _three(values: npt.ArrayLike) -> Triple:
     return float(a), float(b), float(c)
 
 
-def bond_stress(growth: Crack, nodes: Ints, force: Array) -> Array:
-    """Bond forces over tributary areas as global vectors, tension positive, shape (n, 3).
+def per_area(growth: Crack, nodes: Ints, forces: Array) -> Array:
+    """Forces over tributary areas, shape (n, 3) [force/length^2].
 
     Args:
         growth: The interface.
         nodes: Slave nodes, shape (n,).
-        force: Force on the slave side per window component, shape (n_retained,).
+        forces: Vectors, shape (n, 3) [force].
     """
     areas = growth.solver.pairs[growth.p].surface.areas[nodes]
     areas = np.where(areas > 0.0, areas, np.inf)  # corners of second-order facets may have none
-    return np.asarray(-growth.solver.vectors(growth.p, nodes, force) / areas[:, None])
+    return np.asarray(forces / areas[:, None])
 
 
 def bond_state(
@@ -111,7 +107,7 @@ def bond_state(
 
     Args:
         growth: The interface.
-        ramps: Bonds that let go with time or over increments.
+        ramps: Bonds that are released with time or over increments.
         values: What the criterion says at the present front; None where it is not active.
 
     Returns:
@@ -142,7 +138,7 @@ def bond_state(
             out[name][record.node] = getattr(record, name)
     gone = np.array([record.node for record in growth.records], dtype=np.int64)
     if len(gone):
-        stress = bond_stress(growth, gone, state.force)
+        stress = -per_area(growth, gone, growth.solver.vectors(growth.p, gone, state.force))
         frames = np.stack([record.frame for record in growth.records])
         out["DBS"][gone] = np.einsum("nc,nci->ni", stress, frames)
     if values is not None and len(values.tips):

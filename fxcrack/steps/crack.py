@@ -2,33 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
-from fxcrack.criteria import (
-    CrackLengthVsTime,
-    CrackOpening,
-    CriticalStress,
-)
-from fxcrack.criteria.crack_length_vs_time import LengthEvaluator
-from fxcrack.criteria.crack_opening import OpeningEvaluator
-from fxcrack.criteria.critical_stress import StressEvaluator
-from fxcrack.criteria.energy_release import RateEvaluator
+from fxcrack.criteria import Criterion
 from fxcrack.criteria.evaluator import Evaluator, SofteningEvaluator, TipValues, first_crossing
 from fxcrack.criteria.interface_temperature import given_temperature, scene_temperature
-from fxcrack.criteria.probe import openings
+from fxcrack.criteria.probe import FrontProbe, openings
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.crack_extent import CrackExtent
 from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.interface.tips import Tips
+from fxcrack.solvers.front_probe import CondensedFrontProbe
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.bond_records import ReleaseRecord, release_records
 from fxcrack.steps.debond import Debond, softens
@@ -49,6 +40,7 @@ class Crack:
         debond: Interface and criterion.
 
     Attributes:
+        probe: What the criterion asks of the interface.
         n_released: Nodes let go so far.
         records: What is known of every release, in order.
         paths: Where tips come from.
@@ -62,10 +54,13 @@ class Crack:
         self.criterion = debond.criterion
         self.front = solver.fronts[p]
         self.extent = CrackExtent(self.front)
-        self.evaluator: Evaluator = make_evaluator(
-            solver, p, debond.criterion, debond.temperature, softens=softens(debond)
+        self.probe = CondensedFrontProbe(solver, p)
+        self.evaluator, *self.watched = (
+            make_evaluator(
+                solver, self.probe, debond, c, softens=c is debond.criterion and softens(debond)
+            )
+            for c in (debond.criterion, *debond.watch)
         )
-        self.watched = [make_evaluator(solver, p, c, debond.temperature) for c in debond.watch]
         every = [self.evaluator, *self.watched]
         solver.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
         self.n_released = 0
@@ -121,7 +116,7 @@ class Crack:
         """Warn once where faces without contact pass through each other behind a tip."""
         if not self._may_overlap or not len(tips):
             return
-        behind = openings(self.solver, self.p, tips, state)
+        behind = openings(self.probe, tips, state)
         size = float(np.abs(behind).max())
         if size < max(1e-12 * self.front.surface.facet_size, 1e-9 * np.abs(state.jump).max()):
             return  # round-off
@@ -199,33 +194,14 @@ class Crack:
 
 
 def make_evaluator(
-    solver: LinearSolver,
-    p: int,
-    criterion: Any,
-    temperature: float | Callable[[Array], npt.ArrayLike] | None = None,
-    *,
-    softens: bool = False,
+    solver: LinearSolver, probe: FrontProbe, debond: Debond, criterion: Criterion, *, softens: bool
 ) -> Evaluator:
-    """The evaluator that goes with a criterion; collective.
+    """The evaluator of a criterion on an interface; collective.
 
     Raises:
         InputError: The criterion does not fit the interface, or a temperature is missing or wrong.
     """
-    pair, continuum = solver.pairs[p], solver.continuum
-    known = given_temperature(pair, continuum.gdim, temperature)
-    if known is None and criterion.needs_temperature:
-        known = scene_temperature(pair, continuum)
-    if isinstance(criterion, CrackLengthVsTime):
-        return LengthEvaluator(solver, p, criterion)
-    if not isinstance(criterion, CriticalStress | CrackOpening):
-        return RateEvaluator(solver, p, criterion, known, softens=softens)
-    if known is not None and not known.steady:
-        raise InputError(
-            f"interface '{pair.title}': {type(criterion).__name__} cannot follow a temperature "
-            "that changes in time; give Debond(temperature=...), or a criterion by energy release "
-            "rates"
-        )
-    at_nodes = None if known is None else known(0.0)
-    if isinstance(criterion, CriticalStress):
-        return StressEvaluator(solver, p, criterion, at_nodes)
-    return OpeningEvaluator(solver, p, criterion, at_nodes)
+    temperature = given_temperature(probe.pair, probe.gdim, debond.temperature)
+    if temperature is None and criterion.needs_temperature:
+        temperature = scene_temperature(probe.pair, solver.continuum)
+    return criterion.evaluator(probe, temperature, softens=softens)

@@ -97,6 +97,7 @@ def test_ten_thousand_increments(
     scene.close()
 
 
+@pytest.mark.slow
 def test_restoring_states_again_and_again_changes_nothing() -> None:
     """Contact closes and opens 200 times: the updated factor stays that of the open nodes."""
     scene = beam(MPI.COMM_SELF, fx.StepRelease())

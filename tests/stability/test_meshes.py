@@ -54,6 +54,7 @@ SPACINGS: dict[str, tuple[Array, Array | None, int, float]] = {
 }
 
 
+@pytest.mark.quick("*-vcct")
 @pytest.mark.parametrize("method", ["vcct", "closure"])
 @pytest.mark.parametrize("name", SPACINGS)
 def test_spacing(name: str, method: str) -> None:

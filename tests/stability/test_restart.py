@@ -281,14 +281,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     ),
 }
 
-QUICK = (
-    "increments",
-    "progressive",
-    "nonlinear path, progressive",
-    "fatigue in two steps",
-    "3-D",
-)
-"""The others take longer."""
+QUICK = ("progressive", "nonlinear path, progressive", "3-D")
 
 
 def run(

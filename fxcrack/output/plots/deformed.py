@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import unknown_name
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.interface.surface import _closure_table
+from fxcrack.interface.surface import facet_nodes
 from fxcrack.output.fields import displacement_function, stress_function
 from fxcrack.output.plots.style import GREY, INK, colour_bar, dress, new_figure, save
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
@@ -61,18 +61,10 @@ class Shape:
 
 def outer_facets(continuum: Continuum) -> tuple[Ints, Ints]:
     """Outer facets of this rank: their cells, and their displacement nodes in basix order."""
-    domain, tdim = continuum.mesh.domain, continuum.mesh.tdim
-    topology = domain.topology
+    topology, tdim = continuum.mesh.domain.topology, continuum.mesh.tdim
     topology.create_connectivity(tdim - 1, tdim)
-    topology.create_connectivity(tdim, tdim - 1)
-    to_cell, to_facet = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
-    found = [(to_cell.links(f)[0], f) for f in dolfinx.mesh.exterior_facet_indices(topology)]
-    cells = np.array([c for c, _ in found], dtype=np.int64)
-    local = [int(np.flatnonzero(to_facet.links(c) == f)[0]) for c, f in found]
-    element = continuum.space.element.basix_element
-    _, table = _closure_table(element.cell_type, continuum.order)
-    dofs = continuum.space.dofmap.list
-    return cells, dofs[cells[:, None], table[np.array(local, dtype=np.int64)]].astype(np.int64)
+    _, cells, _, nodes = facet_nodes(continuum, dolfinx.mesh.exterior_facet_indices(topology))
+    return cells.astype(np.int64), nodes.astype(np.int64)
 
 
 def _facet_kind(continuum: Continuum) -> str:
@@ -106,7 +98,7 @@ def shape(source: Analysis | HasAnalysis, component: str = "von_mises") -> Shape
         values = _per_cell(stress, len(labels))[:, labels.index(component)]
     x = continuum.positions()
     motion = np.zeros_like(x)
-    motion[:, : continuum.gdim] = u.x.array.reshape(-1, continuum.gdim)
+    motion[:, : continuum.gdim] = continuum.layout.displacements(u.x.array)
     cells, facets = outer_facets(continuum)
     facets = facets[:, _OUTLINES[_facet_kind(continuum), continuum.order]]
     border = np.zeros((0, 2, 3))

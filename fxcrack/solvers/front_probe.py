@@ -1,0 +1,128 @@
+"""What criteria ask of one interface, answered by a condensed solver."""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+from scipy.linalg import cho_solve
+
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.front import Front
+from fxcrack.interface.pairing import Pair
+from fxcrack.solvers.base import InterfaceSolver
+
+_UNBOUNDED = 1e100
+"""Jump per force of nodes that hold a body alone."""
+
+
+class CondensedFrontProbe:
+    """A :class:`fxcrack.criteria.probe.FrontProbe`, where all shapes and signs are given.
+
+    Args:
+        solver: The solver.
+        p: Number of the pair.
+    """
+
+    def __init__(self, solver: InterfaceSolver, p: int) -> None:
+        self._solver = solver
+        self._p = p
+        self.front: Front = solver.fronts[p]
+        self.gdim: int = solver.continuum.gdim
+
+    @property
+    def pair(self) -> Pair:
+        """The interface, paired anew where its faces slide."""
+        return self._solver.pairs[self._p]
+
+    def bond_forces(self, nodes: Ints, state: Equilibrium) -> Array:
+        """Bond forces, tension positive, global vectors of shape (..., 3) [force]."""
+        solver = self._solver
+        index = solver.index[self._p][nodes]
+        rows = np.unique(index[index >= 0])
+        values = np.zeros(solver.system.n_retained)
+        values[rows] = -solver.system.forces(state, rows)
+        return solver.vectors(self._p, nodes, values)
+
+    def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
+        """Jumps, global vectors of shape (..., 3) [length]."""
+        return self._solver.vectors(self._p, nodes, state.jump)
+
+    @property
+    def has_face_loads(self) -> bool:
+        """Whether loads act on the faces of any interface."""
+        return bool(np.any(self._solver.face_loads))
+
+    def face_loads(self, nodes: Ints, state: Equilibrium) -> Array:
+        """Loads on the faces, global vectors of shape (..., 3) [force]."""
+        solver = self._solver
+        factors = state.loads[solver.n_loads - len(solver.loads) :]
+        return solver.vectors(self._p, nodes, solver.face_loads @ factors)
+
+    def released_jumps(self, nodes: Ints, force: Array, normal: Array | None = None) -> Array:
+        """Jumps that releasing some nodes would open, global vectors of shape (k, 3) [length]."""
+        index, frames = self._solver.index[self._p][nodes], self._solver.frames[self._p][nodes]
+        local = np.einsum("kci,kc->ki", frames, force[:, : self.gdim])
+        return self._released(index, index >= 0, local, frames, normal)
+
+    def _released(
+        self, index: Ints, free: Bools, force: Array, frames: Array, normal: Array | None
+    ) -> Array:
+        """Jumps of nodes without some of their bonds, global vectors of shape (k, 3).
+
+        Args:
+            index: Retained components, shape (k, gdim).
+            free: Those released, likewise.
+            force: Their bond forces in local frames, likewise.
+            frames: These, shape (k, gdim, gdim).
+            normal: Direction, shape (3,), in which nothing moves, be it none of the local frames'
+                (they do not turn with the bodies); ``None`` for none.
+        """
+        jump = np.zeros(index.shape)
+        system = self._solver.system
+        star = system.reduced(index[free])
+        try:
+            factor = system.cholesky.factorise(star, index[free])
+        except NotPositiveDefinite:
+            if normal is not None:
+                tangential = free & (np.arange(index.shape[1]) > 0)
+                return self._released(index, tangential, force, frames, None)
+            factor = np.eye(len(star)) / np.sqrt(_UNBOUNDED)
+        jump[free] = cho_solve((factor, True), force[free])
+        if normal is not None:
+            k = len(index)
+            across = np.zeros((*index.shape, k))
+            across[range(k), :, range(k)] = np.einsum("kci,c->ki", frames, normal[: self.gdim])
+            held = across[free]
+            given = cho_solve((factor, True), held)
+            jump[free] -= given @ np.linalg.lstsq(held.T @ given, held.T @ jump[free])[0]
+        world = np.zeros((len(index), 3))
+        world[:, : self.gdim] = np.einsum("kci,ki->kc", frames, jump)
+        return world
+
+    def mean_position(self, group: str) -> Array:
+        """Mean reference position of the nodes of a group, shape (3,) [length]; collective.
+
+        Raises:
+            InputError: The mesh has no such group, or it holds no node.
+        """
+        continuum = self._solver.continuum
+        nodes = continuum.owned_nodes(group)
+        total = np.append(continuum.positions()[nodes].sum(axis=0), len(nodes))
+        total = continuum.comm.allreduce(total, op=MPI.SUM)
+        return np.asarray(total[:3] / total[3])
+
+    def follow(self, where: str | int) -> int:
+        """Follow the mean displacement of a group or of a slave node; its row in :meth:`motion`."""
+        continuum = self._solver.continuum
+        if isinstance(where, str):
+            return self._solver.follow(continuum.owned_nodes(where))
+        layout = continuum.layout
+        node = self.pair.surface.dofs[where]
+        here = np.array([node])[: int(layout.is_owned(node))]
+        return self._solver.follow(layout.to_local(here))
+
+    def motion(self, state: Equilibrium) -> Array:
+        """Displacements that are followed, shape (n_followed, gdim) [length]."""
+        return self._solver.motion(state)
