@@ -10,10 +10,10 @@ demo: $(ready) ## grow a crack through a double cantilever beam; plots in out/dc
 smoke: $(ready) ## the essential path, in a minute
 	.ci/test smoke
 
-test: $(ready) ## quick tests: serial, on 2 and on 3 ranks
+test: $(ready) ## quick tests: in serial, on 2 and on 3 ranks
 	.ci/test quick
 
-test-slow: $(ready) ## the others: verification, convergence, hard cases
+test-slow: $(ready) ## the others: verification, convergence, hard cases, and the rest on each number of ranks
 	.ci/test slow
 
 test-all: test test-slow ## both

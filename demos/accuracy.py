@@ -20,7 +20,7 @@ from rich.console import Console
 
 import fxcrack as fx
 from fxcrack.accuracy import Case, Measured, Setting, report, study
-from fxcrack.accuracy.run import run
+from fxcrack.accuracy.run_study import run_study
 from fxcrack.demos.dcb import ARMS, BEAM, G_IC
 from fxcrack.demos.show import arguments
 from fxcrack.meshes.dcb import dcb_3d
@@ -97,7 +97,7 @@ def main(out: Path, fine: bool = False) -> None:
     console = Console(width=118, highlight=False)
     results = []
     for scene, budget in BUDGETS.items():
-        result = run(scene, budget=2.0 * budget if fine else budget, tell=console.print)
+        result = run_study(scene, budget=2.0 * budget if fine else budget, tell=console.print)
         report.show(result, console)
         name = scene.rpartition(":")[2]
         report.write(result, out / name)

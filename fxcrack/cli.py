@@ -11,7 +11,6 @@ import contextlib
 import importlib
 import importlib.metadata
 import importlib.util
-import json
 import logging
 import os
 import platform
@@ -21,11 +20,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import fxcrack  # isort: skip  (orders MPI before DOLFINx, ends all ranks on an error)
-import dolfinx
-import petsc4py
 import typer
 from mpi4py import MPI
-from petsc4py import PETSc
 from rich import box
 from rich.console import Console
 from rich.table import Table
@@ -33,14 +29,12 @@ from typer.main import get_command
 
 from fxcrack.base import log
 from fxcrack.base.errors import FxcrackError, InputError
-from fxcrack.base.files import replacing
+from fxcrack.base.files import write_json
+from fxcrack.base.machine import cores, machine_memory_mb
 from fxcrack.base.parallel import all_arrive, end_all
 from fxcrack.base.signals import Interrupted
-from fxcrack.bench.problem import NAMES, Problem
-from fxcrack.condensation.mumps_schur import library
-from fxcrack.restart.checkpoint import checkpoints
+from fxcrack.base.terminal import rank_0_console
 
-_FILE_WIDTH = 140  # characters of a table that goes into a file or a pipe
 _PATIENCE = 5.0  # seconds a rank that failed waits for the others to fail with it
 _PACKAGES = ("mumps", "superlu_dist", "superlu", "umfpack", "strumpack", "hypre", "ml", "ptscotch")
 
@@ -52,14 +46,6 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-
-
-def _console() -> Console:
-    """Where rank 0 prints tables, whole if into a file; the other ranks print nowhere."""
-    console = Console(quiet=MPI.COMM_WORLD.rank > 0, highlight=False)
-    if not console.is_terminal and "COLUMNS" not in os.environ:
-        console.width = _FILE_WIDTH
-    return console
 
 
 # -- demos ---------------------------------------------------------------------------
@@ -101,10 +87,12 @@ def demo(
         table = Table(box=None, show_header=False)
         for known, title in titles.items():
             table.add_row(known, title)
-        _console().print(table if titles else "no demos are installed")
+        rank_0_console().print(table if titles else "no demos are installed")
         return
     if name not in titles:
         raise InputError(f"there is no demo '{name}'; known: {', '.join(titles) or 'none'}")
+    from fxcrack.restart.checkpoint import checkpoints
+
     module = importlib.import_module(f"fxcrack.demos.{name}")
     folder = Path("out") / name if out is None else out
     with contextlib.ExitStack() as stack:
@@ -118,7 +106,7 @@ def demo(
 
 @app.command()
 def bench(
-    name: Annotated[str, typer.Argument(help=f"{', '.join(NAMES)} or scale", metavar="NAME")],
+    name: Annotated[str, typer.Argument(help="dcb2d, dcb3d or scale", metavar="NAME")],
     dx: Annotated[
         float | None, typer.Option(help="Element length along the arms [0.0625, in 3-D 0.5].")
     ] = None,
@@ -152,14 +140,15 @@ def bench(
     if name == "scale":
         _scale(sizes, shapes, methods, ranks, limit, memory, json_file, store)
         return
-    from fxcrack.bench import report, run
+    from fxcrack.bench.problem import Problem
+    from fxcrack.bench.speed import run
+    from fxcrack.bench.tables import show_speed
 
     problem = Problem.make(name, dx, dy, ny)
-    result = run.run(problem, MPI.COMM_WORLD, baseline=baseline, repeat=repeat)
-    report.show(result, _console())
+    result = run(problem, MPI.COMM_WORLD, baseline=baseline, repeat=repeat)
+    show_speed(result, rank_0_console())
     if json_file is not None and MPI.COMM_WORLD.rank == 0:
-        with replacing(json_file) as temporary:
-            temporary.write_text(json.dumps(result, indent=1) + "\n")
+        write_json(json_file, result)
 
 
 def _scale(
@@ -172,8 +161,9 @@ def _scale(
     json_file: Path | None,
     store: Path | None,
 ) -> None:
-    from fxcrack.base.machine import machine_memory_mb
-    from fxcrack.bench import fit, scale, scale_report
+    from fxcrack.bench import scale
+    from fxcrack.bench.fit_constants import fit_constants
+    from fxcrack.bench.tables import show_scale
 
     comm = MPI.COMM_WORLD
     if comm.size > 1:
@@ -193,12 +183,11 @@ def _scale(
         console.print(words + (case.get("failed") or f"{case['seconds']['total']:.1f} s"))
 
     result = scale.run(cases, memory_mb=most, limit=limit, tell=tell)
-    scale_report.show(result, _console())
-    wanted = [(json_file, result), (store, fit.constants(result) if store else None)]
+    show_scale(result, rank_0_console())
+    wanted = [(json_file, result), (store, fit_constants(result) if store else None)]
     for path, content in wanted:
         if path is not None:
-            with replacing(path) as temporary:
-                temporary.write_text(json.dumps(content, indent=1) + "\n")
+            write_json(path, content)
 
 
 @app.command()
@@ -217,12 +206,12 @@ def cost(
     ] = None,
 ) -> None:
     """Say what an analysis will cost, on how many ranks, and by which solver."""
-    from fxcrack.base.machine import machine_memory_mb
-    from fxcrack.bench.cost import Constants, Task, advise, shipped
-    from fxcrack.bench.scale_report import show_cost
+    from fxcrack.bench.cost import Task, advise
+    from fxcrack.bench.tables import show_cost
+    from fxcrack.condensation.cost_laws import Constants, shipped
 
     measured = shipped() if constants is None else Constants.read(constants)
-    each = 1e9 * memory if memory else 1e6 * machine_memory_mb(MPI.COMM_WORLD) / _cores()
+    each = 1e9 * memory if memory else 1e6 * machine_memory_mb(MPI.COMM_WORLD) / cores()
     try:
         sizes = [float(n) for n in dofs.split(",")]
     except ValueError as error:
@@ -231,14 +220,7 @@ def cost(
     found = [
         (task, advise(task, bytes_per_rank=each, ranks=ranks, constants=measured)) for task in tasks
     ]
-    show_cost(found, measured, _console())
-
-
-def _cores() -> int:
-    """Cores this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    show_cost(found, measured, rank_0_console())
 
 
 # -- accuracy ------------------------------------------------------------------------
@@ -266,7 +248,7 @@ def accuracy(
 ) -> None:
     """Measure what accuracy costs in time, and advise the cheapest setting for 5, 1 and 0.1 %."""
     from fxcrack.accuracy import report
-    from fxcrack.accuracy.run import run
+    from fxcrack.accuracy.run_study import run_study
 
     if MPI.COMM_WORLD.size > 1:
         raise InputError(
@@ -277,8 +259,8 @@ def accuracy(
         chosen = [float(word) for word in sizes.split(",")] if sizes else []
     except ValueError:
         raise InputError(f"--sizes {sizes}: give numbers with commas, e.g. 1,0.5,0.25") from None
-    console = _console()
-    result = run(scene, budget=budget, sizes=chosen, measure=measure, tell=console.print)
+    console = rank_0_console()
+    result = run_study(scene, budget=budget, sizes=chosen, measure=measure, tell=console.print)
     report.show(result, console)
     name = scene.rpartition(":")[2]
     files = report.write(result, Path("out") / "accuracy" / name if out is None else out)
@@ -290,13 +272,18 @@ def accuracy(
 
 def information() -> dict[str, str]:
     """Versions, solvers and ranks, one line each."""
+    import dolfinx
+    import petsc4py
+    from petsc4py import PETSc
+
+    from fxcrack.condensation.mumps_schur import library
+
     petsc = ".".join(str(n) for n in PETSc.Sys.getVersion())
     kind = f"{PETSc.ScalarType.__name__}, {PETSc.IntType.__name__}"
     solvers = [p for p in _PACKAGES if PETSc.Sys.hasExternalPackage(p)]
     schur = "taken out of MUMPS through PETSc's C interface"
     if library() is None:
         schur = "by back-solves (PETSc's C interface with MUMPS cannot be reached)"
-    cores = _cores()
     mpi = MPI.Get_library_version().replace("\0", "").split("\n")[0].split(",")[0]
     return {
         "fxcrack": fxcrack.__version__,
@@ -311,7 +298,7 @@ def information() -> dict[str, str]:
         "Schur complement": schur,
         "ranks": str(MPI.COMM_WORLD.size),
         "threads": f"{os.environ.get('OMP_NUM_THREADS', 'not limited')} "
-        f"(OMP_NUM_THREADS), {cores} cores",
+        f"(OMP_NUM_THREADS), {cores()} cores",
     }
 
 
@@ -329,7 +316,7 @@ def info() -> None:
     table = Table(box=box.SIMPLE, show_header=False)
     for key, value in information().items():
         table.add_row(key, value)
-    _console().print(table)
+    rank_0_console().print(table)
 
 
 # -- errors and ranks ----------------------------------------------------------------

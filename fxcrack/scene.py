@@ -39,6 +39,7 @@ from fxcrack.mesh import Mesh
 from fxcrack.output.explain import Explanation, explain
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
+from fxcrack.solvers.base import Solver
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.solvers.options import NewtonOptions
@@ -229,7 +230,7 @@ class Scene:
         return self.solver.loads
 
     @property
-    def solver(self) -> LinearSolver:
+    def solver(self) -> Solver:
         """The solver with its present equilibrium."""
         return self.analysis.solver
 
@@ -350,9 +351,6 @@ class Scene:
             for pair, held in zip(self.pairs, solver.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
             solver.start()
-        else:
-            # other retained jumps: the same equilibrium in their components
-            solver.solve(analysis.given_force(analysis.time))
         analysis.started = True
 
     def _go(
@@ -461,7 +459,7 @@ def _analysis(given: SceneInput) -> Analysis:
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver)
     parts = continuum, pairs, supports, loads, list(given.monitors)
-    solver: LinearSolver
+    solver: Solver
     if chosen.solver == "linear":
         solver = LinearSolver(*parts, given.options or CondensedOptions())
     else:

@@ -132,6 +132,15 @@ def growth_curve(history: fx.History, name: str = "bond") -> tuple[Array, Array]
     return column(rows, f"a[{name}]"), column(rows, "N")
 
 
+def time_of(curve: fx.CrackLengthVsTime, length: float) -> float:
+    """First time at which a curve reaches a length; infinite when it never does."""
+    if length > curve.lengths[-1]:
+        return np.inf
+    i = int(np.searchsorted(curve.lengths, length, side="left"))
+    near = slice(max(i - 1, 0), i + 1)
+    return float(np.interp(length, curve.lengths[near], curve.times[near]))
+
+
 def onsets(history: fx.History) -> list[Row]:
     """Rows at which the criterion was reached."""
     return [row for row in history if row["event"] == "onset"]

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 import time
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +18,7 @@ from fxcrack import cli
 from fxcrack.accuracy import AccuracyError, Setting, choose
 from fxcrack.accuracy.launch import SettingFailed, TookTooLong, Workers
 from fxcrack.accuracy.load import load
-from fxcrack.accuracy.run import run
+from fxcrack.accuracy.run_study import run_study
 from fxcrack.accuracy.scenes import STUDIES
 from fxcrack.base.errors import InputError
 from fxcrack.error_estimate import estimate_errors
@@ -103,20 +104,23 @@ def test_a_tiny_study_of_a_users_own_scene(own: str, tmp_path: Path) -> None:
 def test_nothing_hangs_and_a_failure_does_not_end_the_study(own: str) -> None:
     setting = Setting(size=2.0)
     begin = time.monotonic()
-    with Workers(f"{own}:stuck") as workers, pytest.raises(TookTooLong, match="time limit"):
+    with (
+        closing(Workers(f"{own}:stuck")) as workers,
+        pytest.raises(TookTooLong, match="time limit"),
+    ):
         workers.run(setting, 5.0)
     assert time.monotonic() - begin < 20.0
-    with Workers(f"{own}:wrong") as workers:
+    with closing(Workers(f"{own}:wrong")) as workers:
         for ranks in (1, 2):
             with pytest.raises(SettingFailed, match="ZeroDivisionError: by design"):
                 workers.run(replace(setting, ranks=ranks), 30.0)
     two = replace(setting, ranks=2)
     for rank, name in enumerate(("first_wrong", "second_wrong")):  # the other one waits for it
-        with Workers(f"{own}:{name}") as workers:
+        with closing(Workers(f"{own}:{name}")) as workers:
             with pytest.raises(SettingFailed, match=f"by design on {rank}"):
                 workers.run(two, 30.0)
     with pytest.raises(InputError, match=r"no setting gave a result.*ZeroDivisionError"):
-        run(f"{own}:wrong", budget=40.0, sizes=(2.0,))
+        run_study(f"{own}:wrong", budget=40.0, sizes=(2.0,))
 
 
 def test_names_that_name_nothing_are_refused(own: str, tmp_path: Path) -> None:
@@ -130,7 +134,7 @@ def test_names_that_name_nothing_are_refused(own: str, tmp_path: Path) -> None:
         load(f"{own}:f")
     assert load(f"{own}:plain").title == "plain"
     with pytest.raises(InputError, match="budget = 0"):
-        run("dcb", budget=0.0)
+        run_study("dcb", budget=0.0)
     with pytest.raises(SystemExit):
         cli.main(["accuracy", "dcb", "--sizes", "fine"])
 
@@ -139,7 +143,7 @@ def test_names_that_name_nothing_are_refused(own: str, tmp_path: Path) -> None:
 @pytest.mark.convergence
 def test_what_a_study_says_of_the_penny_shaped_crack_is_true(own: str) -> None:
     budget = 30.0  # six runs of a tenth of a second each; Python may take long to start
-    result = run(f"{own}:disc", budget=budget)
+    result = run_study(f"{own}:disc", budget=budget)
     assert result["wall"] < budget + 5.0  # ending the workers included
     assert result["reference"]["exact"]
     assert len(result["records"]) == 6

@@ -1,11 +1,10 @@
-"""Accuracy studies, the pure parts: front, cheapest setting, exponents, plan, advice, labels."""
+"""Accuracy studies, the pure parts: front, cheapest setting, exponents, plan, advice."""
 
 from __future__ import annotations
 
 import itertools
 from dataclasses import replace
 
-import hypothesis
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,9 +12,8 @@ from hypothesis import strategies as st
 
 from fxcrack.accuracy import Setting, Study
 from fxcrack.accuracy.family import settings
-from fxcrack.accuracy.fit import extrapolate, fit_power, plan, predict, unknowns
-from fxcrack.accuracy.labels import overlap, place
 from fxcrack.accuracy.pareto import advice, cheapest, duration, pareto_front, percent
+from fxcrack.accuracy.prediction import extrapolate, fit_power, plan, predict, unknowns
 from fxcrack.accuracy.reference import own_reference, reference, worst
 from fxcrack.accuracy.scenes import STUDIES
 from fxcrack.base.errors import InputError
@@ -273,21 +271,3 @@ def test_a_study_says_what_it_lacks() -> None:
 def test_settings_that_make_no_sense_are_refused(wrong: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
         Setting(**wrong)  # type: ignore[arg-type]
-
-
-# -- labels --------------------------------------------------------------------------
-
-
-@hypothesis.settings(max_examples=30)
-@given(
-    st.lists(st.tuples(st.floats(300.0, 900.0), st.floats(100.0, 500.0)), min_size=1, max_size=6)
-)
-def test_labels_do_not_cover_each_other(anchors: list[tuple[float, float]]) -> None:
-    at = np.array(anchors)
-    boxes = place(at, [(120.0, 14.0)] * len(at), (0.0, 0.0, 1000.0, 600.0))
-    for i, a in enumerate(boxes):
-        assert a[0] >= 0.0
-        assert a[1] >= 0.0
-        assert a[2] <= 1000.0
-        assert a[3] <= 600.0
-        assert all(overlap(a, b) == 0.0 for b in boxes[i + 1 :])

@@ -13,9 +13,11 @@ from mpi4py import MPI
 from rich.console import Console
 
 from fxcrack.base.errors import InputError, SolverError
-from fxcrack.bench import measure, report
+from fxcrack.base.machine import peak_memory
+from fxcrack.bench import measure
 from fxcrack.bench.problem import LENGTHS, Problem
-from fxcrack.bench.run import run
+from fxcrack.bench.speed import run
+from fxcrack.bench.tables import show_speed
 
 COMM = MPI.COMM_WORLD
 KEYS = {
@@ -149,7 +151,7 @@ def test_result_has_all_that_is_promised(problem: Problem) -> None:
 def test_tables_show_what_the_file_holds(problem: Problem) -> None:
     result = measured(problem, baseline=True)
     text = io.StringIO()
-    report.show(result, Console(file=text, width=120))
+    show_speed(result, Console(file=text, width=120))
     shown = text.getvalue()
     for number in (
         str(result["dofs"]),
@@ -166,7 +168,7 @@ def test_memory_of_the_solve_is_measured_apart() -> None:
     ballast = np.ones(40_000_000)  # 320 MB that the other process must not inherit
     memory = measure.memory_of_one_solve(COARSE, COMM)
     assert memory is not None
-    assert 20.0 < memory < measure.peak_memory(COMM) - 0.5e-6 * ballast.nbytes
+    assert 20.0 < memory < peak_memory(COMM) - 0.5e-6 * ballast.nbytes
 
 
 def test_memory_is_left_out_where_no_process_can_be_started(
@@ -186,7 +188,7 @@ def test_repeating_keeps_the_fastest(monkeypatch: pytest.MonkeyPatch, repeat: in
         totals.append(growth.seconds["total"])
         return growth, scene
 
-    monkeypatch.setattr("fxcrack.bench.run.grow", noted)
+    monkeypatch.setattr("fxcrack.bench.speed.grow", noted)
     result = run(Problem.make("dcb2d", 2.5), COMM, memory=False, repeat=repeat)
     assert len(totals) == repeat
     assert result["seconds"]["total"] == min(totals)

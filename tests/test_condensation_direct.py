@@ -109,7 +109,6 @@ def test_remains_in_the_other_triangle(
     last = np.concatenate([np.arange(100) * 100 + k for k in CASES["four lines"][1]])
     matrix, _, _ = grid_matrix(comm, 100, last)
     factor = SchurFactor(matrix, len(last))
-    assert factor.memory_mb() >= 1.0  # the dense S alone
     factor.destroy()
     matrix.destroy()
     if comm.rank == 0:

@@ -310,7 +310,7 @@ def test_window_of_columns(column: float, window: float, steps: list[int]) -> No
     assert ColumnCost(column, window).reach(counts[:0]) == 0
     cost = ColumnCost.guess(1000)
     cost.observe(10, 2.0, 2.5)
-    assert (cost.column, cost.window) == (0.2, 0.5)
+    assert (cost.column, cost.per_set) == (0.2, 0.5)
 
 
 @pytest.mark.mpi

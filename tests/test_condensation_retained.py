@@ -98,7 +98,7 @@ def test_memory_cap(continuum: Continuum) -> None:
     assert (found == RETAINED).sum() == 20
     _, found = roles(continuum, cap_mb=16 * 10**2 / 1e6)
     assert (found == RETAINED).sum() == 10
-    with pytest.raises(InputError, match="window needs 10 jump components at least"):
+    with pytest.raises(InputError, match="at least 10 jump components must be retained"):
         roles(continuum, cap_mb=16 * 9.5**2 / 1e6)
 
 

@@ -20,11 +20,13 @@ from typer.testing import CliRunner
 import fxcrack as fx
 from fxcrack.base.errors import InputError
 from fxcrack.base.machine import machine_memory_mb, machine_name
-from fxcrack.bench import fit, scale_report
-from fxcrack.bench.cost import Constants, Law, Task, advise, estimate, shipped
+from fxcrack.bench.cost import Task, advise, estimate
+from fxcrack.bench.fit_constants import fit_constants
 from fxcrack.bench.rates import dense_rate, unshared_rate
-from fxcrack.bench.scale import Case, measure, suite
+from fxcrack.bench.scale import ScaleCase, measure, suite
+from fxcrack.bench.tables import show_scale
 from fxcrack.cli import app
+from fxcrack.condensation.cost_laws import Constants, Law, shipped
 
 
 def case(shape: str, dofs: float, method: str, **more: Any) -> dict[str, Any]:
@@ -63,7 +65,7 @@ def measured() -> dict[str, Any]:
 @pytest.fixture
 def known(tmp_path: Path) -> Constants:
     path = tmp_path / "constants.json"
-    path.write_text(json.dumps(fit.constants(measured())))
+    path.write_text(json.dumps(fit_constants(measured())))
     return Constants.read(path)
 
 
@@ -87,7 +89,7 @@ def test_missing_cases_are_named() -> None:
     result = measured()
     result["cases"] = [c for c in result["cases"] if c["method"] == "schur"]
     with pytest.raises(InputError, match="no case of 3-D, iterative"):
-        fit.constants(result)
+        fit_constants(result)
 
 
 @given(st.floats(1e3, 1e9), st.integers(1, 64), st.sampled_from(["direct", "iterative"]))
@@ -136,7 +138,7 @@ def test_bad_input_is_refused(tmp_path: Path) -> None:
         Constants.read(tmp_path / "no.json")
     for bad in (("ball", 1e4, "schur"), ("block", 1e4, "lu"), ("block", 1.0, "schur")):
         with pytest.raises(InputError, match="choose"):
-            Case(*bad)
+            ScaleCase(*bad)
 
 
 def test_shipped_constants() -> None:
@@ -181,7 +183,7 @@ def test_iteration_where_a_factorisation_would_not_fit(
 @pytest.mark.parametrize("shape", ["block", "plate", "plane"])
 def test_meshes_have_about_the_dofs_wanted(shape: str) -> None:
     for wanted in (5e4, 3e5):
-        problem = Case(shape, wanted, "schur").problem()
+        problem = ScaleCase(shape, wanted, "schur").problem()
         if shape == "block":
             n = round(100.0 / problem.dx)
             found = 3.0 * (n + 1) ** 2 * 2 * (problem.ny + 1)
@@ -203,13 +205,13 @@ def test_suite() -> None:
 @pytest.mark.slow
 @pytest.mark.mpi
 def test_both_methods_measure_the_same_crack(comm: MPI.Intracomm) -> None:
-    direct, iterative = (measure(Case("block", 1500, m), comm) for m in ("schur", "iterative"))
+    direct, iterative = (measure(ScaleCase("block", 1500, m), comm) for m in ("schur", "iterative"))
     for key in ("dofs", "releases"):
         assert direct[key] == iterative[key]
     assert iterative["load"] == pytest.approx(direct["load"], rel=1e-6)
     assert iterative["columns"] > 0 == direct["columns"]
     assert direct["seconds"]["factor_with_schur"] > 0.0 == iterative["seconds"]["factor_with_schur"]
-    whole = measure(Case("block", 1500, "schur", ahead=True), comm)
+    whole = measure(ScaleCase("block", 1500, "schur", ahead=True), comm)
     assert whole["releases"] == 0 and "load" not in whole
 
 
@@ -220,14 +222,14 @@ def test_tables() -> None:
             c["seconds"] |= {"total": 10.0, "march": 0.0}
             c["bytes_per_dof"] = 1e6 * c["memory_mb"] / c["dofs"]
     text = io.StringIO()
-    scale_report.show(result, Console(file=text, width=150))
+    show_scale(result, Console(file=text, width=150))
     shown = text.getvalue()
     assert "time on 1 rank over that on P" in shown and "failed" not in shown
     # the seconds of `case` on 2 ranks are 0.6 of those on 1
     assert "1.67" in shown
     assert "share nothing" not in shown
     result["unshared"] = {"1": {"memory": 1.0, "caches": 1.0}, "2": {"memory": 1.6, "caches": 1.0}}
-    scale_report.show(result, Console(file=text, width=150))
+    show_scale(result, Console(file=text, width=150))
     assert "do 1.25 x the work of one if it comes from memory, 2.00 x" in text.getvalue()
 
 

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from specimens import time_of
 
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
@@ -306,9 +307,9 @@ def test_no_extrapolation() -> None:
     assert CURVE.value(0.999, [10.0, 11.0], [1.0, 1.0]).tolist() == [0.0, 0.0]
     assert CURVE.value(1.0, [10.0], [1.0]) == pytest.approx([1.0])
     assert CURVE.value(100.0, [13.5], [1.0]) == CURVE.value(4.0, [13.5], [1.0])
-    assert CURVE.time_of(13.0) == pytest.approx(4.0)
-    assert CURVE.time_of(13.1) == math.inf
-    assert CURVE.time_of(5.0) == 1.0
+    assert time_of(CURVE, 13.0) == pytest.approx(4.0)
+    assert time_of(CURVE, 13.1) == math.inf
+    assert time_of(CURVE, 5.0) == 1.0
 
 
 def test_can_start() -> None:
@@ -325,7 +326,7 @@ def test_can_start() -> None:
 def test_a_node_goes_when_the_curve_reaches_it(dt: Array, dl: Array, part: float) -> None:
     curve = CrackLengthVsTime(dt.cumsum(), 5.0 + dl.cumsum(), reference="left")
     tip = 5.0 + dl[0] + part * (dl.cumsum()[-1] - dl[0])
-    time = curve.time_of(tip)
+    time = time_of(curve, tip)
     # Times and lengths of about 20 over steps of at least 0.1.
     assert curve.value(time, [tip], [0.5]) == pytest.approx([1.0], abs=1e-12)
     if time > curve.times[0]:

@@ -352,7 +352,7 @@ def test_state_is_that_of_the_whole_problem(comm: MPI.Intracomm, name: str) -> N
 def test_transformed_matrix_with_its_borders(comm: MPI.Intracomm, name: str) -> None:
     """T^t K T, and T^t times minus the force patterns and the monitors, in their places."""
     scene = run(name, comm)
-    found = scene.solver._condensation
+    found = scene.solver.condensation
     t = gathered(found.coordinates.transform)
     oracle = Oracle(scene)
     expected = (t.T @ oracle.k @ t).toarray()

@@ -16,12 +16,11 @@ import subprocess
 import tempfile
 import time
 from dataclasses import replace
-from types import TracebackType
 from typing import Any
 
 from fxcrack.accuracy.study import Setting
 from fxcrack.accuracy.worker import MARK
-from fxcrack.base import machine as processes
+from fxcrack.base import processes
 from fxcrack.base.errors import FxcrackError
 
 _GRACE = 2.0  # seconds between asking a worker to end and ending it
@@ -131,7 +130,7 @@ class _Worker:
 
 
 class Workers:
-    """Context manager that runs settings of one study.
+    """Runs settings of one study; :meth:`close` ends its processes (``contextlib.closing``).
 
     Args:
         scene: Name of the study, as for :func:`fxcrack.accuracy.load.load`.
@@ -144,16 +143,7 @@ class Workers:
         self._warm = warm
         self._running: dict[int, _Worker] = {}
 
-    def __enter__(self) -> Workers:
-        """Nothing is started yet."""
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
         """End all workers."""
         for ranks in list(self._running):
             self._drop(ranks)

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+from fxcrack.accuracy.scenes import known
 from fxcrack.accuracy.study import Study
 from fxcrack.base.errors import FxcrackError, InputError
 
@@ -24,8 +25,6 @@ def load(name: str) -> Study:
     """
     where, colon, function = name.rpartition(":")
     if not colon:
-        from fxcrack.accuracy.scenes import known
-
         return known(name)
     found = getattr(_module(where), function, None)
     if isinstance(found, Study):

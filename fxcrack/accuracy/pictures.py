@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import itertools
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib import patheffects
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter
 from mpi4py import MPI
 
-from fxcrack.accuracy.fit import FIT_POINTS, FIT_RANGE
-from fxcrack.accuracy.labels import Box, nearest, place
 from fxcrack.accuracy.pareto import TARGETS
+from fxcrack.accuracy.prediction import FIT_POINTS, FIT_RANGE
 from fxcrack.accuracy.study import Setting
 from fxcrack.base.arrays import Array
 from fxcrack.output.plots.style import COLOURS, GREY, INK, LIGHT, new_figure, save
@@ -25,7 +21,7 @@ from fxcrack.output.plots.style import COLOURS, GREY, INK, LIGHT, new_figure, sa
 Result = dict[str, Any]
 
 _SHAPES = (("quadrilateral", "hexahedron"), ("triangle", "tetrahedron"))
-_MARKERS = {"vcct": "o", "closure": "s", "increment": "^", "solver": "D", "ranks": "P"}
+_MARKERS = {"vcct": "o", "closure": "s", "increment": "^", "solver": "D", "ranks": "h"}
 _WORDS = {
     "vcct": "VCCT, events",
     "closure": "exact closure",
@@ -44,7 +40,7 @@ _FLOOR = 1e-6  # errors below are drawn there
 
 
 def draw_error(result: Result, path: Path) -> None:
-    """Error against seconds with the Pareto front, each of its points labelled; collective."""
+    """Error against seconds with the Pareto front, its points numbered; collective."""
     save(MPI.COMM_SELF, path, lambda: error_figure(result))
 
 
@@ -65,7 +61,7 @@ def error_figure(result: Result) -> Figure:
     figure, ax = new_figure(8.2, 5.1)
     _logarithmic(ax, "seconds from mesh to result", "error")
     good = np.isfinite(y)
-    _limits(ax, x[good], y[good], left=0.3)
+    _limits(ax, x[good], y[good])
     _targets(ax)
     _blur(ax, result["uncertainty"])
     lines: dict[Setting, list[int]] = {}
@@ -80,12 +76,13 @@ def error_figure(result: Result) -> Figure:
         )  # fmt: skip
     front = result["pareto"]
     ax.step(x[front], y[front], where="post", color=INK, linewidth=1.4, zorder=4)
-    for i in front:
-        ax.plot(
-            x[i], y[i], _MARKERS[_kind(settings[i], settings[0])], color=_colour(settings[i]),
-            markersize=9.0, markeredgecolor=INK, markeredgewidth=1.2, zorder=5,
+    for number, i in enumerate(front, 1):
+        ax.plot(x[i], y[i], **_front_marker(settings[i], settings[0]), zorder=5)
+        ax.text(
+            x[i], y[i], str(number), fontsize=7.5, color="white", ha="center",
+            va="center_baseline", fontweight="bold", zorder=6,
         )  # fmt: skip
-    _explain(ax, settings)
+    _explain(ax, settings, front, result["unit"])
     ax.set_title(
         f"{_sentence(result['title'])}\n",
         fontsize=11.5,
@@ -97,16 +94,6 @@ def error_figure(result: Result) -> Figure:
     ax.text(
         0.0, 1.015, _counted(result), transform=ax.transAxes, fontsize=9.5, color=GREY,
         va="bottom",
-    )  # fmt: skip
-    unit = f" {result['unit']}" if result["unit"] else ""
-    texts = [f"{settings[i].title}, {settings[i].size:g}{unit}" for i in front]
-    corners = np.repeat(np.column_stack([x[front], y[front]]), 2, axis=0)
-    corners[1:-1:2, 0] = x[front][1:]  # the front goes right, then down
-    right = ax.get_xlim()[1]
-    targets = [np.array([[right * 1e-9, t], [right, t]]) for t in TARGETS]
-    _label(
-        figure, ax, np.column_stack([x[front], y[front]]), texts, np.column_stack([x, y])[good],
-        [corners, *targets],
     )  # fmt: skip
     return figure
 
@@ -166,12 +153,11 @@ def _plain(value: float, _: Any = None) -> str:
     return f"{value:,.0f}" if value >= 1e3 else f"{value:g}"
 
 
-def _limits(ax: Axes, x: Array, y: Array, *, left: float) -> None:
-    """Room below and to the left of the points, in decades, where labels go."""
-    low, high = np.log10(x.min()), np.log10(x.max())
-    ax.set_xlim(10 ** (low - left), 10 ** (high + 0.15))
-    low, high = np.log10(y.min()), np.log10(y.max())
-    ax.set_ylim(10 ** (low - 0.45), 10 ** (high + 0.15))
+def _limits(ax: Axes, x: Array, y: Array) -> None:
+    """A margin around the points, in decades; the reference's uncertainty is named at the foot."""
+    for values, setter, below in ((x, ax.set_xlim, 0.15), (y, ax.set_ylim, 0.3)):
+        low, high = np.log10(values.min()), np.log10(values.max())
+        setter(10 ** (low - below), 10 ** (high + 0.15))
 
 
 def _targets(ax: Axes) -> None:
@@ -197,8 +183,16 @@ def _blur(ax: Axes, uncertainty: float) -> None:
         )  # fmt: skip
 
 
-def _explain(ax: Axes, settings: list[Setting]) -> None:
-    """What colours and shapes of points mean, beside the axes."""
+def _front_marker(setting: Setting, base: Setting) -> dict[str, Any]:
+    """How a point of the front is drawn, large enough for its number."""
+    return {
+        "marker": _MARKERS[_kind(setting, base)], "color": _colour(setting), "markersize": 12.0,
+        "markeredgecolor": INK, "markeredgewidth": 1.2, "linestyle": "none",
+    }  # fmt: skip
+
+
+def _explain(ax: Axes, settings: list[Setting], front: list[int], unit: str) -> None:
+    """Beside the axes: what colours and shapes of points mean, and which settings are the front."""
     handles = [Line2D([], [], color=INK, linewidth=1.4, label="nothing faster is better")]
     seen = {_colour(s): s for s in reversed(settings)}
     for colour in COLOURS:
@@ -216,56 +210,14 @@ def _explain(ax: Axes, settings: list[Setting]) -> None:
                     label=_WORDS[kind],
                 )
             )  # fmt: skip
+    for number, i in enumerate(front, 1):
+        words = f"{number}  {settings[i].title}, {settings[i].size:g} {unit}".rstrip()
+        look = _front_marker(settings[i], settings[0]) | {"markersize": 8.0}
+        handles.append(Line2D([], [], **look, label=words))
     ax.legend(
         handles=handles, frameon=False, fontsize=9, labelcolor=INK, loc="upper left",
-        bbox_to_anchor=(1.08, 1.0), borderaxespad=0.0,
+        bbox_to_anchor=(1.1, 1.0), borderaxespad=0.0,
     )  # fmt: skip
-
-
-def _label(
-    figure: Figure, ax: Axes, anchors: Array, texts: list[str], points: Array, paths: list[Array]
-) -> None:
-    """Write a label beside each anchor, with a line to it, off points and paths."""
-    canvas: Any = FigureCanvasAgg(figure)
-    canvas.draw()
-    figure.set_layout_engine("none")  # the places found below belong to this layout
-    renderer = canvas.get_renderer()
-    trial = [ax.text(0.5, 0.5, t, fontsize=8.5, transform=ax.transAxes) for t in texts]
-    sizes = []
-    for text in trial:
-        box = text.get_window_extent(renderer)
-        sizes.append((box.width, box.height))
-        text.remove()
-    frame = ax.get_window_extent(renderer)
-    _make_room(ax, anchors[:, 0], [(width + 45.0) / frame.width for width, _ in sizes])
-    bounds: Box = (frame.x0 + 4, frame.y0 + 4, frame.x1 - 2, frame.y1 - 2)
-    at = ax.transData.transform(anchors)
-    pixels = [ax.transData.transform(path) for path in paths]
-    segments = [(a, b) for path in pixels for a, b in itertools.pairwise(path)]
-    placed = place(
-        at, sizes, bounds, points=ax.transData.transform(points), segments=segments, radius=8.0,
-        scale=figure.dpi / 100.0,
-    )  # fmt: skip
-    back = ax.transAxes.inverted()
-    for anchor, where, words in zip(at, placed, texts, strict=True):
-        x, y = back.transform((0.5 * (where[0] + where[2]), 0.5 * (where[1] + where[3])))
-        ends = back.transform(np.array([anchor, nearest(where, anchor)]))
-        ax.plot(*ends.T, color=GREY, linewidth=0.7, transform=ax.transAxes, zorder=4.5)
-        ax.text(
-            x, y, words, fontsize=8.5, color=INK, ha="center", va="center",
-            transform=ax.transAxes, zorder=6,
-            path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white")],
-        )  # fmt: skip
-
-
-def _make_room(ax: Axes, x: Array, shares: list[float]) -> None:
-    """Move the left end so that a label of some share of the width fits left of each x."""
-    low, high = np.log10(ax.get_xlim())
-    at = np.log10(x)
-    for middle, share in zip(at, shares, strict=True):
-        # (place - low)/(high - low) >= share
-        low = min(low, float((middle - share * high) / (1.0 - share)))
-    ax.set_xlim(10**low, 10**high)
 
 
 # -- cost against size ---------------------------------------------------------------

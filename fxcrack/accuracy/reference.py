@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from fxcrack.accuracy.fit import extrapolate
+from fxcrack.accuracy.prediction import extrapolate
 from fxcrack.accuracy.study import Setting
 
 MAIN = ("load", "G", "length")

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from rich import box
 from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -14,7 +12,8 @@ from rich.text import Text
 from fxcrack.accuracy.pareto import duration, percent
 from fxcrack.accuracy.pictures import draw_cost, draw_error
 from fxcrack.accuracy.study import Setting
-from fxcrack.base.files import replacing
+from fxcrack.base.files import replacing, write_json
+from fxcrack.base.terminal import new_table
 
 Result = dict[str, Any]
 
@@ -33,7 +32,7 @@ def write(result: Result, out: Path) -> list[Path]:
     """Write numbers, table and pictures into a folder, each file whole or not at all.
 
     Args:
-        result: What :func:`fxcrack.accuracy.run.run` returned.
+        result: What :func:`fxcrack.accuracy.run_study.run_study` returned.
         out: Folder, made if missing.
 
     Returns:
@@ -41,8 +40,7 @@ def write(result: Result, out: Path) -> list[Path]:
     """
     out.mkdir(parents=True, exist_ok=True)
     files = [out / name for name in FILES]
-    with replacing(files[0]) as temporary:
-        temporary.write_text(json.dumps(result, indent=1) + "\n", encoding="utf-8")
+    write_json(files[0], result)
     with replacing(files[1]) as temporary:
         temporary.write_text(markdown(result), encoding="utf-8")
     draw_error(result, files[2])
@@ -90,13 +88,11 @@ def _seconds(seconds: float) -> str:
 
 def _table(result: Result) -> Table:
     names = list(result["reference"]["values"])
-    table = Table(
-        title=f"{result['title']}; * nothing faster is better", title_justify="left",
-        box=box.SIMPLE_HEAD,
-    )  # fmt: skip
-    table.add_column("", min_width=1)
-    for i, heading in enumerate((*_HEADINGS, *names)):
-        table.add_column(heading, justify="left" if i == 0 else "right", no_wrap=True)
+    title = f"{result['title']}; * nothing faster is better"
+    table = new_table(title, "", *_HEADINGS, *names)
+    table.columns[0].min_width, table.columns[1].justify = 1, "left"
+    for column in table.columns[1:]:
+        column.no_wrap = True
     for pareto, row in _rows(result, names):
         table.add_row("*" if pareto else "", *row, style="bold" if pareto else None)
     return table
@@ -158,7 +154,7 @@ def summary(results: list[Result]) -> str:
     """Several studies as one Markdown table, a row each, with what was measured on which machine.
 
     Args:
-        results: What :func:`fxcrack.accuracy.run.run` returned.
+        results: What :func:`fxcrack.accuracy.run_study.run_study` returned.
     """
     lines = [
         "| problem | errors from | 5 % | 1 % | 0.1 % |",

@@ -29,6 +29,10 @@ from fxcrack.continuum.materials import Isotropic
 from fxcrack.criteria import VCCT, Fatigue
 from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
+from fxcrack.meshes.dcb import dcb_2d
+from fxcrack.meshes.enf import enf_2d
+from fxcrack.meshes.mmb import mmb_2d
+from fxcrack.meshes.penny import penny as penny_mesh
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
@@ -73,7 +77,6 @@ def _elements(height: float, size: float) -> int:
 def dcb(setting: Setting) -> Case:
     """Load at a = 35, G at a load of 60 at a = 30, crack length at an opening of 2.1."""
     from fxcrack.demos.dcb import ARMS, BEAM, G_IC
-    from fxcrack.meshes.dcb import dcb_2d
 
     mesh = dcb_2d(
         length=100.0, height=BEAM.h, dx=setting.size, ny=_elements(BEAM.h, setting.size),
@@ -130,7 +133,6 @@ def enf(setting: Setting) -> Case:
     Not at a deflection: under a point support in the plane it grows with the logarithm of 1/size.
     """
     from fxcrack.demos.enf import ARMS, BEAM, G_IIC
-    from fxcrack.meshes.enf import enf_2d
 
     mesh = enf_2d(
         half_span=50.0, height=BEAM.h, dx=setting.size, ny=_elements(BEAM.h, setting.size),
@@ -175,7 +177,6 @@ def enf(setting: Setting) -> Case:
 def mmb(setting: Setting) -> Case:
     """Load at a = 35, G and the share of mode II at a load of 100 at a = 35."""
     from fxcrack.demos.mmb import ARMS, BEAM, CRITERION, HALF_SPAN
-    from fxcrack.meshes.mmb import mmb_2d
 
     lever, force = 42.0, 100.0
     mesh = mmb_2d(
@@ -227,9 +228,8 @@ def mmb(setting: Setting) -> Case:
 def penny(setting: Setting) -> Case:
     """Pressure at onset, G at a pressure of 1 MPa, opening of the middle."""
     from fxcrack.demos.penny import NU, OPENING, PRESSURE, RADIUS, RATE, E
-    from fxcrack.meshes import penny as meshes
 
-    mesh = meshes.penny(
+    mesh = penny_mesh(
         a=RADIUS, radius=30.0 * RADIUS, half_height=30.0 * RADIUS, dr=setting.size,
         fine=max(0.5, 2.0 * setting.size), growth=1.0 + 3.0 * setting.size,
         cell=setting.cell, order=setting.order,
@@ -294,7 +294,6 @@ def fatigue_dcb(setting: Setting) -> Case:
         U_MAX,
         closed_form,
     )  # fmt: skip
-    from fxcrack.meshes.dcb import dcb_2d
 
     until, at = 34.0, 75_000.0
     mesh = dcb_2d(

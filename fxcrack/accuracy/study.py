@@ -8,20 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.errors import InputError
+from fxcrack.condensation.options import CondensedOptions
 from fxcrack.history import History, Row
-
-if TYPE_CHECKING:
-    from fxcrack.condensation.options import CondensedOptions
-    from fxcrack.scene import Scene
-    from fxcrack.steps.cycles import Cycles
-    from fxcrack.steps.end_conditions import Until
-    from fxcrack.steps.static import Static
+from fxcrack.scene import Scene
+from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.end_conditions import Until
+from fxcrack.steps.static import Static
 
 _CELLS = {"quadrilateral": 2, "triangle": 2, "hexahedron": 3, "tetrahedron": 3}
 _SHORT = {"quadrilateral": "quad", "triangle": "tri", "hexahedron": "hex", "tetrahedron": "tet"}
@@ -97,14 +95,10 @@ class Setting:
 
     def options(self) -> CondensedOptions:
         """Options of the scene."""
-        from fxcrack.condensation.options import CondensedOptions
-
         return CondensedOptions(method=self.solver)
 
     def step(self, until: Until | tuple[Until, ...]) -> Static:
         """A quasi-static step with this stepping, cut back as often as the tolerance needs."""
-        from fxcrack.steps.static import Static
-
         return Static(until, stepping=self.stepping, max_cutbacks=40)
 
     def rate_options(self) -> dict[str, Any]:

@@ -18,7 +18,6 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import fxcrack  # isort: skip  (orders MPI before DOLFINx)
@@ -26,8 +25,8 @@ from mpi4py import MPI
 
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.study import Setting, Study
-from fxcrack.base.parallel import all_arrive
-from fxcrack.bench.measure import peak_memory, slowest
+from fxcrack.base.machine import peak_memory, reset_peak_memory
+from fxcrack.base.parallel import all_arrive, slowest
 from fxcrack.history import Row
 
 MARK = "@fxcrack-accuracy "
@@ -56,21 +55,12 @@ class Memory:
         if trim is not None:
             trim(0)
         self.by_phase: dict[str, float] = {}
-        self.separate = self.comm.allreduce(int(_forget_peak()), op=MPI.MIN) == 1
+        self.separate = self.comm.allreduce(int(reset_peak_memory()), op=MPI.MIN) == 1
 
     def end(self, phase: str) -> None:
         """A phase ends here."""
         self.by_phase[phase] = peak_memory(self.comm)
-        _forget_peak()
-
-
-def _forget_peak() -> bool:
-    """Make the highest resident size start again from the present one; whether that works."""
-    try:
-        Path("/proc/self/clear_refs").write_text("5")
-    except OSError:
-        return False
-    return True
+        reset_peak_memory()
 
 
 def run_once(study: Study, setting: Setting, comm: MPI.Intracomm, *, memory: bool) -> Result:

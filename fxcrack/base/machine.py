@@ -1,10 +1,10 @@
-"""What the machine has: memory and a name."""
+"""What the machine has, and what this process takes of it: processor, cores, memory."""
 
 from __future__ import annotations
 
 import os
 import platform
-import shutil
+import resource
 import sys
 from pathlib import Path
 
@@ -33,50 +33,48 @@ def _memory() -> float:
     return min(found, default=float("inf"))
 
 
-def machine_name() -> str:
-    """Processor, cores and memory in words."""
-    model = platform.processor() or platform.machine()
+def processor() -> str:
+    """Name of the processor, of its architecture where the system does not tell."""
     info = Path("/proc/cpuinfo")
     if info.exists():
-        for line in info.read_text().splitlines():
+        for line in info.read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
-                model = line.split(":", 1)[1].strip()
-                break
-    return f"{model}, {os.cpu_count()} cores, {_memory() / 1000.0:.0f} GB"
+                return line.split(":", 1)[1].strip()
+    return platform.processor() or platform.machine()
 
 
-# what a launcher tells its processes must not reach the processes of another launcher
-_LAUNCHER = ("PMI", "HYD", "MPIR_", "MPICH_", "OMPI_", "PRTE_", "OPAL_", "ORTE_", "MPI_LOCAL")
-_KEPT = ("OMPI_MCA_btl", "OMPI_ALLOW_RUN_AS_ROOT", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM")
+def machine_name() -> str:
+    """Processor, cores and memory in words."""
+    return f"{processor()}, {os.cpu_count()} cores, {_memory() / 1000.0:.0f} GB"
 
 
-def launcher() -> str | None:
-    """The mpiexec that belongs to this Python's environment, else the one on PATH, if any."""
-    near = Path(sys.executable).parent / "mpiexec"
-    return str(near) if near.exists() else shutil.which("mpiexec")
+def cores() -> int:
+    """Number of cores this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
-def command(module: str, words: list[str], ranks: int) -> list[str] | None:
-    """Command line that runs a module with this Python.
-
-    Returns:
-        ``None`` if several ranks are asked for and no launcher is there.
-    """
-    python = [sys.executable, "-m", module, *words]
-    if ranks == 1:
-        return python
-    found = launcher()
-    return None if found is None else [found, "-n", str(ranks), *python]
+def peak_memory(comm: MPI.Intracomm) -> float:
+    """Highest resident size of every rank's process so far, summed over ranks, MB; collective."""
+    return float(comm.allreduce(_peak()))
 
 
-def environment() -> dict[str, str]:
-    """This process's environment, without what its own launcher left in it.
+def _peak() -> float:
+    """Highest resident size of this process, MB."""
+    status = Path("/proc/self/status")
+    if status.exists():
+        # not getrusage: a process started by a large one inherits that one's maximum there
+        lines = [line.split() for line in status.read_text().splitlines()]
+        return next(float(line[1]) for line in lines if line[0] == "VmHWM:") * 1024.0 / 1e6
+    unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024.0
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
 
-    More ranks than cores are allowed, also in Open MPI (4 and 5). Linear algebra runs on one thread
-    per rank unless OMP_NUM_THREADS says otherwise: ranks share the cores.
-    """
-    found = {k: v for k, v in os.environ.items() if k in _KEPT or not k.startswith(_LAUNCHER)}
-    found.setdefault("OMP_NUM_THREADS", "1")
-    found["OMPI_MCA_rmaps_base_oversubscribe"] = "1"
-    found["PRTE_MCA_rmaps_default_mapping_policy"] = ":oversubscribe"
-    return found
+
+def reset_peak_memory() -> bool:
+    """Let the highest resident size start again from the present one; whether that works."""
+    try:
+        Path("/proc/self/clear_refs").write_text("5")
+    except OSError:
+        return False
+    return True

@@ -38,6 +38,11 @@ def all_arrive(comm: MPI.Intracomm, patience: float) -> bool:
     return True
 
 
+def slowest(comm: MPI.Intracomm, seconds: float) -> float:
+    """The largest of the ranks' times; collective."""
+    return float(comm.allreduce(seconds, op=MPI.MAX))
+
+
 def end_all(comm: MPI.Intracomm, code: int) -> None:
     """End all ranks, once what was written has had time to arrive."""
     sys.stdout.flush()

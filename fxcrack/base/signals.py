@@ -11,7 +11,7 @@ import os
 import signal
 import socket
 import threading
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any
 
 PATIENCE = 6.0
@@ -81,12 +81,7 @@ class Listener:
             threading.Thread(target=self._watch, args=(self._ends[0],), daemon=True).start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         """Give the signals back."""
         self._done.set()
         for number, handler in self._before.items():

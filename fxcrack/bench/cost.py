@@ -13,16 +13,12 @@ The exponents are those of nested dissection (George 1973). The constants come f
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
-from typing import Any
 
 from fxcrack.base.errors import InputError
+from fxcrack.condensation.cost_laws import Constants, shipped
 
-CONSTANTS = Path(__file__).with_name("cost_constants.json")
 METHODS = ("direct", "iterative")
 
 _BLOCK = 32  # columns solved together
@@ -30,78 +26,6 @@ _S_BYTES = 16.0  # S and its growing factor, per entry
 _S_MOST = 2e9  # bytes of them, the default of CondensedOptions.window_mb
 _REDUCTIONS, _EXCHANGES = 3, 7  # per iteration; the latter per level
 _MOST_RANKS = 65536
-_USABLE = 0.9  # of a machine's memory
-
-
-@dataclass(frozen=True)
-class Law:
-    """a n + b n^e (log2 n)^l, measured for n from ``low`` to ``high``."""
-
-    linear: float
-    power: float
-    exponent: float
-    log: float
-    low: float
-    high: float
-
-    def __call__(self, n: float) -> float:
-        """Its value at n."""
-        growth = float(n**self.exponent) * float(math.log2(n) ** self.log)
-        return self.linear * n + self.power * growth
-
-    def measured(self, n: float) -> bool:
-        """Whether n is among the sizes measured."""
-        return self.low * 0.9 <= n <= self.high * 1.1
-
-
-@dataclass(frozen=True)
-class Constants:
-    """Measured constants of the laws.
-
-    Attributes:
-        date: When they were measured.
-        machine: Where.
-        laws: By name, such as "direct_seconds_3" (s) or "direct_memory_3" (bytes).
-        iterations: Iterations of a block of columns, by shape.
-        per_entry: Seconds per entry of S in a factorisation, by dimension.
-        release: Seconds per w^2 of a release.
-        latency: Seconds of a small message.
-        per_byte: Seconds per byte of a large one.
-        gain: Exponent g of the ranks, 1 if 2 ranks halve the time, by method and dimension.
-    """
-
-    date: str
-    machine: str
-    laws: dict[str, Law]
-    iterations: dict[str, float]
-    per_entry: dict[str, float]
-    release: float
-    latency: float
-    per_byte: float
-    gain: dict[str, float]
-
-    @classmethod
-    def read(cls, path: Path) -> Constants:
-        """From a file that `fxcrack bench scale --store` wrote.
-
-        Raises:
-            InputError: It is not such a file.
-        """
-        try:
-            values: dict[str, Any] = json.loads(path.read_text())
-            values["laws"] = {k: Law(**v) for k, v in values["laws"].items()}
-            return cls(**values)
-        except (OSError, ValueError, TypeError, KeyError) as error:
-            raise InputError(
-                f"{path} holds no cost constants ({error}); write it by "
-                "'fxcrack bench scale --store FILE'"
-            ) from error
-
-
-@cache
-def shipped() -> Constants:
-    """The constants that come with fxcrack."""
-    return Constants.read(CONSTANTS)
 
 
 @dataclass(frozen=True)
@@ -137,7 +61,7 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Estimate:
+class CostEstimate:
     """Expected cost of a task.
 
     Attributes:
@@ -167,7 +91,7 @@ class Estimate:
 
 def estimate(
     task: Task, method: str, ranks: int = 1, constants: Constants | None = None
-) -> Estimate:
+) -> CostEstimate:
     """Expected seconds and memory.
 
     Args:
@@ -212,7 +136,7 @@ def estimate(
     measured = {phase: few and law.measured(n) for phase in seconds}
     measured |= {"mesh, assembly, T": few and base.measured(n), "growth on S": True}
     measured |= {part: few and memory_law.measured(n) for part in memory}
-    return Estimate(method, ranks, seconds, memory, measured)
+    return CostEstimate(method, ranks, seconds, memory, measured)
 
 
 def _message_seconds(n: float, ranks: int, c: Constants) -> float:
@@ -231,7 +155,7 @@ def advise(
     bytes_per_rank: float,
     ranks: int | None = None,
     constants: Constants | None = None,
-) -> list[Estimate]:
+) -> list[CostEstimate]:
     """Estimates of all methods that fit, the best first; on as many ranks as their memory asks for.
 
     Args:

@@ -11,20 +11,19 @@ its own:  python -m fxcrack.bench.measure dcb2d 0.0625 0.125 32
 from __future__ import annotations
 
 import json
-import resource
-import subprocess
 import sys
 import time
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack
-from fxcrack.base import machine as processes
 from fxcrack.base.errors import SolverError
+from fxcrack.base.machine import peak_memory
+from fxcrack.base.parallel import slowest
+from fxcrack.base.processes import run_module
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.condensation.mumps_schur import mumps_message, ordering
 from fxcrack.history import History, Row
@@ -34,27 +33,6 @@ from fxcrack.scene import Scene
 
 _WORKSPACE = 40  # per cent more than MUMPS estimates (ICNTL(14)), as in the condensation
 _CHILD_LIMIT = 1800.0  # seconds
-
-
-def peak_memory(comm: MPI.Intracomm) -> float:
-    """Highest resident size of every rank's process so far, summed over ranks, MB; collective."""
-    return float(comm.allreduce(_peak()))
-
-
-def _peak() -> float:
-    """Highest resident size of this process, MB."""
-    status = Path("/proc/self/status")
-    if status.exists():
-        # not getrusage: a process started by a large one inherits that one's maximum there
-        lines = [line.split() for line in status.read_text().splitlines()]
-        return next(float(line[1]) for line in lines if line[0] == "VmHWM:") * 1024.0 / 1e6
-    unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024.0
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
-
-
-def slowest(comm: MPI.Intracomm, seconds: float) -> float:
-    """The largest of the ranks' times; collective."""
-    return float(comm.allreduce(seconds, op=MPI.MAX))
 
 
 class TimedHistory(History):
@@ -225,27 +203,13 @@ def memory_of_one_solve(problem: Problem, comm: MPI.Intracomm) -> float | None:
     """
     found = None
     if comm.rank == 0:
-        found = _in_own_processes(problem, comm.size)
+        words = [problem.name, str(problem.dx), str(problem.dy), str(problem.ny)]
+        found = run_module(__name__, words, comm.size, _CHILD_LIMIT).get("memory")
     waiting = comm.Ibarrier()
     while not waiting.Test():
         time.sleep(0.05)  # leave the cores to the processes measured
     memory: float | None = comm.bcast(found)
     return memory
-
-
-def _in_own_processes(problem: Problem, ranks: int) -> float | None:
-    words = [problem.name, str(problem.dx), str(problem.dy), str(problem.ny)]
-    command = processes.command(__name__, words, ranks)
-    if command is None:
-        return None
-    try:
-        run = subprocess.run(
-            command, env=processes.environment(), capture_output=True, text=True, check=True,
-            timeout=_CHILD_LIMIT, stdin=subprocess.DEVNULL,
-        )  # fmt: skip
-        return float(json.loads(run.stdout.splitlines()[-1])["memory"])
-    except (OSError, subprocess.SubprocessError, ValueError, LookupError):
-        return None
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from fxcrack.bench.measure import slowest
+from fxcrack.base.parallel import slowest
 from fxcrack.equilibrium.growing_cholesky import GrowingCholesky
 
 Result = dict[str, Any]

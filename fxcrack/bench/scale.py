@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import json
 import resource
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -23,15 +22,16 @@ import numpy as np
 from mpi4py import MPI
 
 import fxcrack
-from fxcrack.base import machine as processes
 from fxcrack.base.errors import FxcrackError, InputError
-from fxcrack.base.machine import machine_name
-from fxcrack.bench.measure import peak_memory, slowest
+from fxcrack.base.machine import machine_name, peak_memory
+from fxcrack.base.parallel import slowest
+from fxcrack.base.processes import run_module
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.bench.rates import dense_rate, message_rate, unshared_rate
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_3d
+from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.end_conditions import CrackLength
 from fxcrack.steps.static import Static
 
@@ -45,7 +45,7 @@ Result = dict[str, Any]
 
 
 @dataclass(frozen=True)
-class Case:
+class ScaleCase:
     """One model, one method, a number of ranks.
 
     Attributes:
@@ -105,7 +105,7 @@ def _count(name: str, dx: float) -> float:
 
 def suite(
     sizes: list[float], shapes: list[str], methods: list[str], ranks: list[int]
-) -> list[Case]:
+) -> list[ScaleCase]:
     """Cases for all sizes; several ranks and a large window at the middle size only.
 
     Without 1 among the ranks all sizes run on each of them, and nothing else. In 2-D the direct
@@ -118,17 +118,19 @@ def suite(
         for method in methods if shape != "plane" else ["schur"]:
             if 1 not in ranks:
                 out += [
-                    Case(shape, factor * s, method, False, p) for s in sorted(sizes) for p in ranks
+                    ScaleCase(shape, factor * s, method, False, p)
+                    for s in sorted(sizes)
+                    for p in ranks
                 ]
                 continue
-            out += [Case(shape, factor * s, method, False, 1) for s in sorted(sizes)]
-            out += [Case(shape, factor * middle, method, False, p) for p in ranks if p > 1]
+            out += [ScaleCase(shape, factor * s, method, False, 1) for s in sorted(sizes)]
+            out += [ScaleCase(shape, factor * middle, method, False, p) for p in ranks if p > 1]
         if "schur" in methods and 1 in ranks:
-            out.append(Case(shape, factor * middle, "schur", True))
+            out.append(ScaleCase(shape, factor * middle, "schur", True))
     return out
 
 
-def measure(case: Case, comm: MPI.Intracomm) -> Result:
+def measure(case: ScaleCase, comm: MPI.Intracomm) -> Result:
     """Run a case in the processes at hand; collective, the same result on every rank."""
     before = peak_memory(comm)
     comm.Barrier()
@@ -155,6 +157,7 @@ def measure(case: Case, comm: MPI.Intracomm) -> Result:
     seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "march", "fields")}
     seconds["total"] = end - clock[0] - (clock[3] - clock[2])
     system = scene.solver.system
+    assert isinstance(scene.solver, LinearSolver)
     store = scene.solver.columns
     space = store.space if store is not None else None
     result: Result = {
@@ -178,7 +181,7 @@ def measure(case: Case, comm: MPI.Intracomm) -> Result:
 
 
 def run(
-    cases: list[Case],
+    cases: list[ScaleCase],
     *,
     memory_mb: float,
     limit: float,
@@ -204,36 +207,16 @@ def run(
         "cases": [],
     }
     for ranks in sorted({1} | {case.ranks for case in cases}):
-        out["unshared"][str(ranks)] = _start([], ranks, limit)
+        out["unshared"][str(ranks)] = run_module(__name__, [], ranks, limit)
     for case in cases:
         words = [case.shape, f"{case.dofs:g}", case.method, str(int(case.ahead))]
         words.append(f"{memory_mb / case.ranks:.0f}")
-        result = {**asdict(case), "dim": case.dim, **_start(words, case.ranks, limit)}
+        result = {**asdict(case), "dim": case.dim, **run_module(__name__, words, case.ranks, limit)}
         out["message"] = result.pop("message", out.get("message"))
         out["cases"].append(result)
         if tell is not None:
             tell(result)
     return out
-
-
-def _start(words: list[str], ranks: int, limit: float) -> Result:
-    """The result of a case in processes of its own, or "failed" with the reason."""
-    command = processes.command(__name__, words, ranks)
-    if command is None:
-        return {"failed": "there is no mpiexec"}
-    try:
-        done = subprocess.run(
-            command, env=processes.environment(), capture_output=True, text=True, check=True,
-            timeout=limit, stdin=subprocess.DEVNULL,
-        )  # fmt: skip
-        found: Result = json.loads(done.stdout.splitlines()[-1])
-    except subprocess.TimeoutExpired:
-        return {"failed": f"not finished after {limit:g} s"}
-    except subprocess.CalledProcessError as error:
-        return {"failed": f"code {error.returncode}: {error.stderr.strip()[-200:]}"}
-    except (OSError, ValueError, LookupError) as error:
-        return {"failed": f"{type(error).__name__}: {error}"}
-    return found
 
 
 def main() -> None:
@@ -248,7 +231,7 @@ def main() -> None:
     if float(memory_mb) > 0.0:
         most = int(float(memory_mb) * 1e6)
         resource.setrlimit(resource.RLIMIT_DATA, (most, most))
-    case = Case(shape, float(dofs), method, bool(int(ahead)), comm.size)
+    case = ScaleCase(shape, float(dofs), method, bool(int(ahead)), comm.size)
     try:
         result = measure(case, comm)
         if comm.size > 1:

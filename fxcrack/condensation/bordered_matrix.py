@@ -70,8 +70,8 @@ class BorderedMatrix:
 
     Attributes:
         matrix: The matrix.
-        on_window: What each border holds in the window rows (for a force pattern minus the load on
-            the slave face), shape (n_retained, n_borders), on every rank.
+        on_retained: What each border holds in the rows of retained jumps (for a force pattern minus
+            the load on the slave face), shape (n_retained, n_borders), on every rank.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class BorderedMatrix:
         self._inner: PETSc.Mat | None = None  # without borders, where that is another matrix
         self._where: Ints = np.zeros(0, dtype=np.int64)  # its entries among those of the whole
         inner = stiffness.ptap(coordinates.transform)
-        self.on_window = np.zeros((coordinates.n_retained, len(borders)))
+        self.on_retained = np.zeros((coordinates.n_retained, len(borders)))
         if not borders:
             self.matrix = inner
             return
@@ -95,7 +95,7 @@ class BorderedMatrix:
         indptr, indices, data = inner.getValuesCSR()
         parts: list[Any] = [sp.csr_matrix((data, indices, indptr), shape=shape)]
         parts += self._border_parts(inner, coordinates, borders, comm)
-        comm.Bcast(self.on_window)
+        comm.Bcast(self.on_retained)
         if renewable:  # zeros are stored as well: they may not be zero next time
             coo = [part.tocoo() for part in parts]
             row, col, value = (
@@ -137,8 +137,8 @@ class BorderedMatrix:
         for i, border in enumerate(borders):
             coordinates.transform.multTranspose(border, right)
             if comm.rank == 0:
-                window = slice(coordinates.n_inner, coordinates.n_inner + coordinates.n_retained)
-                self.on_window[:, i] = right.array[window]
+                retained = slice(coordinates.n_inner, coordinates.n_inner + coordinates.n_retained)
+                self.on_retained[:, i] = right.array[retained]
             local = np.flatnonzero(right.array)
             values = right.array[local]
             parts.append(

@@ -59,7 +59,7 @@ class SchurColumns:
     Args:
         continuum: Elastic bodies.
         stiffness: K; stays with the caller.
-        coordinates: T with a window of all jumps that may open; owned from now on.
+        coordinates: T with all jumps that may open retained; owned from now on.
         borders: Force patterns and monitors from :func:`load_and_monitor_vectors`; stay with the
             caller.
         rtol: Energy norm of a column's error over that of the column.
@@ -185,8 +185,8 @@ class SchurColumns:
         q.destroy()
         return u
 
-    def on_window(self, n_borders: int) -> Array:
-        """What each border holds in the window rows, shape (n_retained, n_borders)."""
+    def on_retained(self, n_borders: int) -> Array:
+        """What each border holds in the rows of retained jumps, shape (n_retained, n_borders)."""
         n, first = self.coordinates.n_retained, self.coordinates.n_last - n_borders
         out: Array = self._corner[:n, first:].toarray()
         return out

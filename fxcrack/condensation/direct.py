@@ -1,4 +1,4 @@
-"""Condensation of the linear continuum onto window, support, force and monitor coordinates.
+"""Condensation of the bodies onto retained jumps, supports, forces and monitors.
 
     A = T^t K T, bordered by -T^t f for every force pattern f and by T^t l for every monitor l,
     S = A_22 - A_21 A_11^-1 A_12   on x = (jumps, prescribed amplitudes, load factors, 0)
@@ -18,7 +18,6 @@ from fxcrack.base import compat
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.timings import Timings
-from fxcrack.bench.cost import _USABLE, shipped
 from fxcrack.condensation.bordered_matrix import BorderedMatrix
 from fxcrack.condensation.mumps_schur import (
     TOO_SMALL,
@@ -48,7 +47,7 @@ class DirectCondensation:
     Attributes:
         schur: S, shape (n_last, n_last), the same on every rank.
         n_negative: Negative pivots of the inner block, where it need not be definite.
-        borders_on_window: See :class:`BorderedMatrix`.
+        borders_on_retained: See :class:`BorderedMatrix`.
         diagonal: That of A on the last coordinates, shape (n_last,): S is a difference from it.
     """
 
@@ -76,7 +75,7 @@ class DirectCondensation:
         self._by_schur = method == "schur" or (method == "auto" and library() is not None)
         start = time.perf_counter()
         self._bordered = BorderedMatrix(stiffness, coordinates, borders, renewable=renewable)
-        self.matrix, self.borders_on_window = self._bordered.matrix, self._bordered.on_window
+        self.matrix, self.borders_on_retained = self._bordered.matrix, self._bordered.on_retained
         self.diagonal = self._last_diagonal()
         timings.add("transform", start)
         self._condense(gdim=stiffness.getBlockSize())
@@ -329,19 +328,3 @@ class DirectCondensation:
         self._bordered.destroy()
         if not keep_transform:
             self.coordinates.transform.destroy()
-
-
-def too_large_for_direct(dofs: int, memory: float) -> str | None:
-    """Why a 3-D model of some dofs should not be factored in a memory, ``None`` if it may.
-
-    Args:
-        dofs: Displacement dofs.
-        memory: Bytes of all machines together.
-    """
-    needed = shipped().laws["direct_memory_3"](dofs)
-    if needed <= _USABLE * memory:
-        return None
-    return (
-        f"a factorisation of {dofs} dofs would take about {needed / 1e9:.0f} GB of the "
-        f"{memory / 1e9:.0f} GB there are"
-    )

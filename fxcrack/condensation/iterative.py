@@ -1,8 +1,8 @@
-"""Condensation onto a window without any factorisation of the bodies.
+"""Condensation onto retained jumps without any factorisation of the bodies.
 
-A window is a selection of a :class:`SchurColumns`: its components keep their columns, components
+The retained jumps are a selection of a :class:`SchurColumns`: they keep their columns, components
 that are free by now and of no interest are condensed out by dense algebra, the others are zero.
-A new window costs only the columns nobody has computed yet.
+A new selection costs only the columns nobody has computed yet.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from fxcrack.interface.supports import Supports
 
 Roles = list[npt.NDArray[np.int8]]
 
-_MANY = 4  # columns kept beyond the memory allowed, over those a window needs
+_MANY = 4  # columns kept beyond the memory allowed, over those the retained jumps need
 
 
 class IterativeCondensation:
@@ -42,13 +42,14 @@ class IterativeCondensation:
 
     Args:
         space: Where the columns are; outlives the condensation.
-        roles: Roles of the jumps in the window wanted.
+        roles: Roles of the jumps.
         timings: Where seconds are counted.
 
     Attributes:
-        coordinates: Numbering of the window. Its transformation is that of the space.
+        coordinates: Numbering of the retained jumps. Their transformation is that of the space.
         schur: S, shape (n_last, n_last), the same on every rank.
-        borders_on_window: What each border holds in the window rows, (n_retained, n_borders).
+        borders_on_retained: What each border holds in the rows of retained jumps, shape
+            (n_retained, n_borders).
         computed: Columns that had to be computed.
         column_seconds: Seconds they took.
     """
@@ -58,14 +59,14 @@ class IterativeCondensation:
         self.timings = timings
         start = time.perf_counter()
         whole = space.coordinates
-        self.coordinates, window, free = _select(whole, roles)
+        self.coordinates, retained, free = _select(whole, roles)
         rest = np.arange(whole.n_retained, whole.n_last)
-        self.computed = space.require(np.concatenate([window, free, rest]))
+        self.computed = space.require(np.concatenate([retained, free, rest]))
         self.column_seconds = time.perf_counter() - start
         order = np.argsort(space.known)
         self._kept, self._free = (
             order[np.searchsorted(space.known, numbers, sorter=order)]
-            for numbers in (np.concatenate([window, rest]), free)
+            for numbers in (np.concatenate([retained, rest]), free)
         )
         self.schur = space.schur[np.ix_(self._kept, self._kept)]
         self._follow = np.zeros((len(free), len(self._kept)))
@@ -78,7 +79,7 @@ class IterativeCondensation:
             self._follow = -cho_solve(factor, coupling)
             self.schur += coupling.T @ self._follow
             self.schur = 0.5 * (self.schur + self.schur.T)
-        self.borders_on_window = space.on_window(whole.n_borders)[window]
+        self.borders_on_retained = space.on_retained(whole.n_borders)[retained]
         timings.add("columns", start)
 
     def displacement(self, last: Array) -> PETSc.Vec:
@@ -104,8 +105,8 @@ class IterativeCondensation:
 
 
 def _select(whole: JumpCoordinates, roles: Roles) -> tuple[JumpCoordinates, Ints, Ints]:
-    """Numbering of a window within the whole one; whole numbers of its and of free components."""
-    index, window, free = [], [], []
+    """Numbering of some retained jumps; numbers in the whole set of these and of free ones."""
+    index, retained, free = [], [], []
     n = 0
     for role, number in zip(roles, whole.index, strict=True):
         inside = (role == RETAINED) & (number >= 0)
@@ -113,10 +114,10 @@ def _select(whole: JumpCoordinates, roles: Roles) -> tuple[JumpCoordinates, Ints
         mine[inside] = n + np.arange(int(inside.sum()))
         n += int(inside.sum())
         index.append(mine)
-        window.append(number[inside])
+        retained.append(number[inside])
         free.append(number[(role == FREE) & (number >= 0)])
     coordinates = replace(whole, index=index, n_retained=n)
-    return coordinates, np.concatenate(window), np.concatenate(free)
+    return coordinates, np.concatenate(retained), np.concatenate(free)
 
 
 class SchurColumnCache:
@@ -152,11 +153,11 @@ class SchurColumnCache:
         borders: list[PETSc.Vec],
         timings: Timings,
     ) -> IterativeCondensation:
-        """A condensation onto the window of some roles; collective.
+        """A condensation onto the retained jumps of some roles; collective.
 
         Args:
             roles: FIXED, FREE or RETAINED per pair and jump component, shape (n_nodes, gdim).
-            may_open: Held components that later windows may hold, likewise.
+            may_open: Held components that may be retained later, likewise.
             stiffness: K.
             borders: Force patterns and monitors.
             timings: Where seconds are counted.
@@ -181,7 +182,7 @@ class SchurColumnCache:
         return IterativeCondensation(self.space, roles, timings)
 
     def _fits(self, roles: Roles) -> bool:
-        """Whether the present space can serve a window, and is not too full of old columns."""
+        """Whether the present space can serve some roles, and is not too full of old columns."""
         if self.space is None:
             return False
         for role, known in zip(roles, self._roles, strict=True):

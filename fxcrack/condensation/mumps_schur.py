@@ -181,10 +181,6 @@ class SchurFactor:
         self._call("MatMumpsSetIcntl", self._factor, _ICNTL_REDUCED, 0)
         self._call("MatSolve", self._factor, _handle(right), _handle(solution))
 
-    def memory_mb(self) -> float:
-        """Memory MUMPS used on all ranks for the factorisation, MB."""
-        return float(self._infog(22))
-
     def destroy(self) -> None:
         """Free the factor; collective."""
         if self._factor:

@@ -14,13 +14,14 @@ class CondensedOptions:
     """How the condensation is done.
 
     Args:
-        method: "schur", "columns" (both factor the bodies, see :class:`Condensation`), "iterative"
-            (columns by conjugate gradients with multigrid, no factorisation: for 3-D models too
-            large for one) or "auto": "schur" where it is available, "iterative" where the factors
-            of a 3-D model would not fit the memory of the machine.
-        window_mb: Memory the dense matrices of the window may take, and the stored columns of
-            "iterative" before old ones are dropped, MB.
-        rows: Force the window to reach at most this distance ahead of the front (length);
+        method: "schur", "columns" (both factor the bodies, see
+            :class:`~fxcrack.condensation.direct.DirectCondensation`), "iterative" (columns by
+            conjugate gradients with multigrid, no factorisation: for 3-D models too large for one)
+            or "auto": "schur" where it is available, "iterative" where the factors of a 3-D model
+            would not fit the memory of the machine.
+        window_mb: Memory the dense matrices of the retained jumps may take, and the stored columns
+            of "iterative" before old ones are dropped, MB.
+        rows: Let the retained jumps reach at most this distance ahead of the front (length);
             ``None`` lets the cost model decide.
         rtol: "iterative" only: energy norm of a column's error over that of the column. The error
             of S is its square.

@@ -1,12 +1,12 @@
 """Which jump components take part in the condensation, and when to factor again.
 
-Ahead of the front the window holds the bonded nodes the crack may reach before the next rebase;
+Ahead of the front these are the bonded nodes the crack may reach before the next rebase;
 behind it, the wake the criterion looks at; with contact, all open normals, and with friction all
 open components of interfaces with contact. How far it reaches is the number of nodes k that costs
-least. With a factorisation per window:
-ceil(L/k) (t_plain + c n(k)^2), L nodes to go, n window components, c the cost of an entry of S.
-With columns by iteration, each computed once: (L/k) t_window + t_column (n(k) - n(0))/2, the last
-window being half used on average. The constants are refitted from what was measured last.
+least. With a factorisation per set:
+ceil(L/k) (t_plain + c n(k)^2), L nodes to go, n retained jumps, c the cost of an entry of S.
+With columns by iteration, each computed once: (L/k) t_set + t_column (n(k) - n(0))/2, the last
+set being half used on average. The constants are refitted from what was measured last.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from fxcrack.interface.jump_coordinates import FIXED, FREE, RETAINED
 from fxcrack.interface.pairing import Pair
 
 WAKE_ROWS = 2
-"""Rows of open nodes behind the front that stay in the window."""
+"""Rows of open nodes behind the front that stay retained."""
 
 
 @dataclass
 class CostModel:
-    """Seconds of a factorisation with n window components: t_plain + c n^2.
+    """Seconds of a factorisation with n retained jumps: t_plain + c n^2.
 
     The constants start from `fxcrack bench` on one core (2-D, 211,332 dofs: 0.92 s plain and
     0.97 s with 972 components; 3-D, 126,630 dofs: 2.9 s and 8.1 s with 4,599) and are refitted by
@@ -61,7 +61,7 @@ class CostModel:
         """Best number of candidate nodes to take.
 
         Args:
-            counts: Cumulative number of window components after each candidate node,
+            counts: Cumulative number of retained jumps after each candidate node,
                 nearest first, shape (n_candidates,).
 
         Returns:
@@ -83,28 +83,28 @@ class ColumnCost:
 
     Attributes:
         column: Seconds of a column.
-        window: Seconds of a new window without columns.
+        per_set: Seconds of a new set of retained jumps without columns.
     """
 
     column: float
-    window: float
+    per_set: float
 
     @classmethod
     def guess(cls, n_dofs: int) -> ColumnCost:
         """Constants before anything was measured."""
-        return cls(column=2e-6 * n_dofs, window=0.02)
+        return cls(column=2e-6 * n_dofs, per_set=0.02)
 
     def observe(self, n_columns: int, column_seconds: float, seconds: float) -> None:
         """Take over measured times.
 
         Args:
-            n_columns: Columns computed for the last window.
+            n_columns: Columns computed for the last set.
             column_seconds: Seconds they took.
-            seconds: Seconds of the window in all.
+            seconds: Seconds of the set in all.
         """
         if n_columns:
             self.column = column_seconds / n_columns
-        self.window = max(seconds - column_seconds, 1e-4)
+        self.per_set = max(seconds - column_seconds, 1e-4)
 
     def reach(self, counts: npt.NDArray[np.int64]) -> int:
         """Best number of candidate nodes to take; see :meth:`CostModel.reach`."""
@@ -112,7 +112,7 @@ class ColumnCost:
             return 0
         k = np.arange(1, len(counts) + 1)
         wasted = 0.5 * self.column * (counts - counts[0]).astype(float)
-        return int(np.argmin(self.window * len(counts) / k + wasted)) + 1
+        return int(np.argmin(self.per_set * len(counts) / k + wasted)) + 1
 
 
 def choose_roles(
@@ -136,12 +136,12 @@ def choose_roles(
         reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
         cost: Cost model.
         around: Distances ahead of and behind the tips that the criterion looks at, per pair.
-        keep: (pair, slave node) of bonds that are letting go and must stay in the window.
+        keep: (pair, slave node) of bonds that carry a force and must stay retained.
         cap_mb: Memory S may take, MB.
         gdim: Dimension.
 
     Raises:
-        InputError: Even the smallest useful window exceeds the cap.
+        InputError: Even the smallest useful set exceeds the cap.
     """
     roles, waiting = [], []
     friction = any(pair.friction is not None for pair in pairs)
@@ -171,7 +171,7 @@ def choose_roles(
             if ahead > 0.0:
                 near |= bonded & (distance <= ahead + margin)
                 far = far + ahead + margin
-            role[near] = _window_of(pair, role[near])
+            role[near] = _retained_of(pair, role[near])
             rest = np.flatnonzero(bonded & ~near & (distance <= far))
             rest = rest[np.lexsort((rest, distance[rest]))]
             waiting += [(float(distance[i]), p, int(i)) for i in rest]
@@ -186,17 +186,17 @@ def choose_roles(
     most = int(np.sqrt(cap_mb * 1e6 / 8.0 / 2.0))
     if n_fixed > most:
         raise InputError(
-            f"the window needs {n_fixed} jump components at least, whose dense matrices exceed "
+            f"at least {n_fixed} jump components must be retained, whose dense matrices exceed "
             f"the cap of {cap_mb:.0f} MB; raise window_mb, or coarsen the interface"
         )
     fits = counts[counts <= most]
     for _, p, i in waiting[: min(cost.reach(counts), len(fits))]:
-        roles[p][i] = _window_of(pairs[p], roles[p][i])
+        roles[p][i] = _retained_of(pairs[p], roles[p][i])
     return roles
 
 
-def _window_of(pair: Pair, role: npt.NDArray[np.int8]) -> npt.NDArray[np.int8]:
-    """Roles of bonded nodes once they are in the window."""
+def _retained_of(pair: Pair, role: npt.NDArray[np.int8]) -> npt.NDArray[np.int8]:
+    """Roles of bonded nodes once they are retained."""
     out = np.full_like(role, RETAINED)
     if pair.interface.normal_only:
         out[..., 1:] = FREE

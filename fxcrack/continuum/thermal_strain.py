@@ -89,11 +89,6 @@ class TemperatureField:
             self.rise.x.array[:] += factor * pattern.x.array
         self.version += 1
 
-    def nodal(self, space: fem.FunctionSpace, time: float) -> Array:
-        """Temperature at the local nodes of a (vector) Lagrange space, owned first, shape (n,)."""
-        factors = np.array([a(time) for a in self.amplitudes])
-        return np.asarray(self.effect.reference + factors @ self.nodal_patterns(space))
-
     def nodal_patterns(self, space: fem.FunctionSpace) -> Array:
         """Patterns at the local nodes of a (vector) Lagrange space, shape (n_patterns, n)."""
         out = []

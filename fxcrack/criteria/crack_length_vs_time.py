@@ -102,21 +102,6 @@ class CrackLengthVsTime(Criterion):
             return -np.inf
         return float(np.interp(time, self.times, self.lengths))
 
-    def time_of(self, length: float) -> float:
-        """First time at which the curve reaches a length; infinite when it never does [time].
-
-        Args:
-            length: Crack length from the reference point [length].
-        """
-        if length > self.lengths[-1]:
-            return np.inf
-        i = int(np.searchsorted(self.lengths, length, side="left"))
-        if i == 0:
-            return float(self.times[0])
-        low, high = self.lengths[i - 1], self.lengths[i]
-        part = (length - low) / (high - low)
-        return float(self.times[i - 1] + part * (self.times[i] - self.times[i - 1]))
-
     def value(self, time: float, tip: npt.ArrayLike, d_behind: npt.ArrayLike) -> Array:
         """Value f of the criterion; 0 before the curve begins.
 

@@ -67,7 +67,7 @@ class CohesiveBonds:
 
     @property
     def components(self) -> Ints:
-        """Window components of all bonds, shape (r,)."""
+        """Components of all bonds, shape (r,)."""
         if not self.bonds:
             return np.zeros(0, dtype=np.int64)
         return np.concatenate([b.components for b in self.bonds])
@@ -140,11 +140,6 @@ class CohesiveBonds:
         """Rates of the jumps for given rates of -g*, branches as they are, shape (r,)."""
         _, stiffness = self._laws()
         return np.asarray(np.linalg.solve(self.star - stiffness, right))
-
-    def forces(self, jump: Array) -> Array:
-        """Forces on the slave side at given soft jumps, shape (r,)."""
-        constant, stiffness = self._laws()
-        return np.asarray(constant + stiffness @ jump)
 
     def stable(self) -> bool:
         """Whether S* - B is positive definite, and not just so."""

@@ -40,7 +40,7 @@ class CohesiveBond:
     """One bond, or several by one law, that softens.
 
     Attributes:
-        components: Its window components, shape (k,).
+        components: Its components among the retained jumps, shape (k,).
         direction: Unit vector of the opening w in them, shape (k,).
         strength: F0, force.
         final: w_f, length.

@@ -1,4 +1,4 @@
-"""The interface alone: dense equilibrium of the window on S, with unilateral contact.
+"""The interface alone: dense equilibrium of the retained jumps on S, with unilateral contact.
 
 Contact holds normal components at -gap while they press (p_n >= 0) and frees them while they gape
 (delta_n >= -gap). With friction, :mod:`fxcrack.equilibrium.friction` finds and follows the states.
@@ -17,12 +17,12 @@ from scipy.optimize import nnls
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import ConvergenceError
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
-from fxcrack.equilibrium.friction import AcceptedFriction, Friction
+from fxcrack.equilibrium.friction import Friction
 from fxcrack.equilibrium.friction_path import follow
 from fxcrack.equilibrium.jump_system import (
+    ComponentStates,
     Equilibrium,
     JumpSystem,
-    Snapshot,
     blend,
     bond_work,
     work_between,
@@ -33,7 +33,7 @@ _ROUND_OFF = 1e-11
 
 
 class ContactSystem(JumpSystem):
-    """States of the window components, contact followed along loads.
+    """States of the retained jumps, contact followed along loads.
 
     Arguments as for :class:`~fxcrack.equilibrium.jump_system.JumpSystem`.
 
@@ -52,24 +52,18 @@ class ContactSystem(JumpSystem):
         self.free[friction.rows] = True
         self.closed = friction.closed(self.n_retained)
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> ComponentStates:
         """What :meth:`restore` needs to return to the present states."""
         saved = super().snapshot()
         if self.friction is None:
             return saved
         return replace(saved, friction=self.friction.save())
 
-    def restore(self, saved: Snapshot) -> None:
-        """Return to earlier states; only contact, friction and softening may have changed."""
+    def restore(self, saved: ComponentStates) -> None:
+        """Return to earlier states of the same components."""
         super().restore(saved)
-        if isinstance(saved.friction, AcceptedFriction) and self.friction is not None:
+        if saved.friction is not None and self.friction is not None:
             self.friction.restore(saved.friction)
-
-    def _set_closed(self, closed: Bools) -> None:
-        if self.friction is None:
-            super()._set_closed(closed)
-        else:
-            self.closed = closed.copy()
 
     def _take(
         self, schur: Array, offset: Array | None, free: Ints, bonds: list[CohesiveBond]
@@ -96,7 +90,7 @@ class ContactSystem(JumpSystem):
             return super().rates(loads, force)
         return self.friction.rates(self, loads, force)
 
-    def _rub(
+    def _follow_friction(
         self, friction: Friction, start: Equilibrium, loads: Array, force: Array
     ) -> Iterator[tuple[float, Equilibrium]]:
         for fraction, point in follow(friction, self, start, loads, force):
@@ -108,7 +102,7 @@ class ContactSystem(JumpSystem):
     def _violations(self, state: Equilibrium) -> tuple[Bools, Array, Array]:
         """Contact components on the wrong side; gaps; pressures of the closed ones.
 
-        A bond that is still letting go carries its given force beside the contact pressure.
+        A bond whose force still falls carries its given force beside the contact pressure.
         """
         gap = np.where(self.contact, state.jump + self.gap, 0.0)
         pressure = np.zeros(self.n_retained)
@@ -220,7 +214,7 @@ class ContactSystem(JumpSystem):
         self, start: Equilibrium, loads: Array, force: Array
     ) -> Iterator[tuple[float, Equilibrium]]:
         if self.friction is not None:
-            yield from self._rub(self.friction, start, loads, force)
+            yield from self._follow_friction(self.friction, start, loads, force)
             return
         here, last = 0.0, start
         stuck = done = 0

@@ -98,6 +98,23 @@ class NodeStates:
         return new
 
 
+@dataclass(frozen=True)
+class FrictionState:
+    """What the contact nodes with friction remember.
+
+    Attributes:
+        where: Pair and slave node, shape (m, 2).
+        states: Open, stick or slip, with slip directions.
+        reference: Tangential jumps of the last accepted state, shape (m, d - 1), length.
+        error: Difference of the two ways to compute the dissipation so far, energy.
+    """
+
+    where: Ints
+    states: NodeStates
+    reference: Array
+    error: float
+
+
 def jumps_of(
     block: ContactBlock,
     load: Array,

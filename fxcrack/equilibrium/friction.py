@@ -8,7 +8,7 @@ jumps are coordinates of a dense problem K delta = g + p, the other free jumps c
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,6 +21,7 @@ from fxcrack.equilibrium.coulomb import (
     SLIP,
     STICK,
     ContactBlock,
+    FrictionState,
     Increment,
     NodeStates,
     Sliding,
@@ -30,21 +31,6 @@ from fxcrack.equilibrium.coulomb import (
 from fxcrack.equilibrium.jump_system import Equilibrium, JumpSystem
 
 
-@dataclass(frozen=True)
-class AcceptedFriction:
-    """Friction states at the last accepted state, the block's nodes in order.
-
-    Attributes:
-        states: Open, stick or slip.
-        reference: Tangential jumps, shape (m, d - 1), length.
-        error: Difference of the two ways to compute the dissipation so far, energy.
-    """
-
-    states: NodeStates
-    reference: Array
-    error: float
-
-
 class Friction:
     """The contact nodes of a jump system with friction.
 
@@ -52,7 +38,7 @@ class Friction:
         dim: Jumps per node, 2 or 3.
 
     Attributes:
-        components: Window components per node, -1 where a support holds one, shape (m, d).
+        components: Retained jumps per node, -1 where a support holds one, shape (m, d).
         where: Pair and slave node, shape (m, 2).
         mu: Friction coefficients, shape (m,).
         gap: Initial gaps, shape (m,).
@@ -90,7 +76,7 @@ class Friction:
         """Take more nodes, whose bonds are gone.
 
         Args:
-            components: Window components, -1 where a support holds one, shape (k, d).
+            components: Retained jumps, -1 where a support holds one, shape (k, d).
             where: Pair and slave node, shape (k, 2).
             mu: Friction coefficients, shape (k,).
             gap: Initial gaps, shape (k,), length.
@@ -119,14 +105,14 @@ class Friction:
 
     @property
     def rows(self) -> Ints:
-        """Window components of the block."""
+        """Retained jumps of the block."""
         return self.components[self.components >= 0]
 
-    def save(self) -> AcceptedFriction:
+    def save(self) -> FrictionState:
         """What :meth:`restore` needs to return here."""
-        return AcceptedFriction(self.states, self.reference.copy(), self.error)
+        return FrictionState(self.where, self.states, self.reference.copy(), self.error)
 
-    def restore(self, saved: AcceptedFriction) -> None:
+    def restore(self, saved: FrictionState) -> None:
         """Return to a saved state of the same nodes."""
         self.states, self.reference, self.error = saved.states, saved.reference.copy(), saved.error
 
@@ -134,12 +120,12 @@ class Friction:
         """Accept a state: slips of the next increment are measured from its jumps.
 
         Args:
-            jump: Jumps of the window, shape (n_retained,), length.
+            jump: Retained jumps, shape (n_retained,), length.
         """
         self.reference = self.of(jump)[:, 1:]
 
     def closed(self, n_retained: int) -> npt.NDArray[np.bool_]:
-        """Which window components are normals in contact, shape (n_retained,)."""
+        """Which retained jumps are normals in contact, shape (n_retained,)."""
         out = np.zeros(n_retained, dtype=bool)
         out[self.components[self.states.status != OPEN, 0]] = True
         return out
@@ -147,11 +133,11 @@ class Friction:
     # -- the block -----------------------------------------------------------------------
 
     def of(self, values: Array) -> Array:
-        """Values of window components at the nodes, 0 where a support holds one, shape (m, d)."""
+        """Values of retained jumps at the nodes, 0 where a support holds one, shape (m, d)."""
         return np.where(self.components >= 0, values[np.maximum(self.components, 0)], 0.0)
 
     def over(self, block: Array, n_retained: int) -> Array:
-        """Values at the nodes as values of all window components."""
+        """Values at the nodes as values of all retained jumps."""
         out = np.zeros(n_retained)
         inside = self.components >= 0
         out[self.components[inside]] = block[inside]
@@ -270,4 +256,4 @@ class Friction:
         return found
 
 
-__all__ = ["AcceptedFriction", "Friction"]
+__all__ = ["Friction"]

@@ -1,91 +1,30 @@
-"""Friction on a condensed model: which nodes take part, and their states over a new window.
+"""Friction on condensed bodies: which nodes take part, and what it dissipates in an increment.
 
-The states belong to slave nodes of pairs; the window numbers them anew at every factorisation.
+The states belong to slave nodes of pairs; every set of retained jumps numbers them anew.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
-from fxcrack.equilibrium.coulomb import OPEN, SLIP, STICK
+from fxcrack.equilibrium.coulomb import OPEN, SLIP, STICK, FrictionState
 from fxcrack.equilibrium.friction import Friction
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
 
 
-@dataclass
-class FrictionMemory:
-    """Friction states by pair and slave node.
-
-    Attributes:
-        where: Pair and slave node, shape (m, 2).
-        status: Open, stick or slip, shape (m,).
-        direction: Slip directions, shape (m, d - 1).
-        reference: Tangential jumps, shape (m, d - 1), length.
-        error: See :class:`fxcrack.equilibrium.friction.Friction`.
-    """
-
-    where: Ints
-    status: Ints
-    direction: Array
-    reference: Array
-    error: float = 0.0
-
-    @classmethod
-    def empty(cls, dim: int) -> FrictionMemory:
-        """Nothing has happened yet."""
-        none = np.zeros((0, dim - 1))
-        return cls(np.zeros((0, 2), dtype=np.int64), np.zeros(0, dtype=np.int64), none, none)
-
-    @classmethod
-    def of(cls, friction: Friction, state: Equilibrium) -> FrictionMemory:
-        """What has to be remembered of an equilibrium, which is committed."""
-        friction.commit(state.jump)
-        return cls(
-            friction.where,
-            friction.states.status,
-            friction.states.direction,
-            friction.reference,
-            friction.error,
-        )
-
-    def state_dict(self) -> dict[str, npt.NDArray[Any]]:
-        """Plain arrays, for :meth:`from_state_dict`."""
-        return {
-            "where": self.where,
-            "status": self.status,
-            "direction": self.direction,
-            "reference": self.reference,
-            "error": np.array([self.error]),
-        }
-
-    @classmethod
-    def from_state_dict(cls, state: Mapping[str, npt.NDArray[Any]]) -> FrictionMemory:
-        """The memory that :meth:`state_dict` was made of."""
-        return cls(
-            np.asarray(state["where"], dtype=np.int64),
-            np.asarray(state["status"], dtype=np.int64),
-            np.asarray(state["direction"], dtype=float),
-            np.asarray(state["reference"], dtype=float),
-            float(state["error"][0]),
-        )
-
-
 @dataclass(frozen=True)
-class Slide:
-    """Energy that friction takes on a way that is predicted on a tangent and corrected at its end.
+class FrictionWork:
+    """Energy that friction dissipates in an increment predicted on a tangent, corrected at its end.
 
     Attributes:
-        predicted: Energy on the predicted way.
+        predicted: Energy on the predicted path.
         start: Tangential jumps at its beginning, shape (m, d - 1), length.
         jump: Those predicted for its end.
         traction: Tangential contact forces predicted there, shape (m, d - 1).
@@ -97,8 +36,8 @@ class Slide:
     traction: Array
 
     @classmethod
-    def of(cls, system: ContactSystem, points: list[tuple[float, Equilibrium]]) -> Slide:
-        """The predicted way, while the system still holds the tangent it was predicted on."""
+    def of(cls, system: ContactSystem, points: list[tuple[float, Equilibrium]]) -> FrictionWork:
+        """The predicted path, while the system still holds the tangent it was predicted on."""
         friction = system.friction
         assert friction is not None
         end = points[-1][1]
@@ -112,7 +51,7 @@ class Slide:
     def energy(self, system: ContactSystem, end: Equilibrium) -> float:
         """Energy up to the corrected end, on whose tangent the system is now.
 
-        The corrections of slips and forces grow with the square of the way.
+        The corrections of slips and forces grow with the square of the increment.
         """
         friction = system.friction
         assert friction is not None
@@ -130,7 +69,7 @@ def has_friction(pairs: list[Pair]) -> bool:
 
 
 def nodes_of(pair: Pair, front: Front, index: Ints) -> Ints:
-    """Slave nodes that may touch: open, paired, with a normal jump in the window."""
+    """Slave nodes that may touch: open, paired, with a retained normal jump."""
     if not pair.interface.contact:
         return np.zeros(0, dtype=np.int64)
     return np.flatnonzero(~front.bonded & pair.paired & (index[:, 0] >= 0))
@@ -141,12 +80,22 @@ def make_friction(
     pairs: list[Pair],
     fronts: list[Front],
     index: list[Ints],
-    memory: FrictionMemory,
+    before: FrictionState | None,
 ) -> None:
-    """Make the block of contact nodes of a new window."""
+    """Make the block of contact nodes of a set of retained jumps.
+
+    Args:
+        system: The dense system of the set.
+        pairs: Interfaces.
+        fronts: Their fronts.
+        index: Numbers of the retained jumps per pair, shape (n_nodes, gdim).
+        before: What the nodes remember, ``None`` at the start.
+    """
     friction = Friction(index[0].shape[1])
-    friction.error = memory.error
-    known = {(int(p), int(k)): i for i, (p, k) in enumerate(memory.where)}
+    known: dict[tuple[int, int], int] = {}
+    if before is not None:
+        friction.error = before.error
+        known = {(int(p), int(k)): i for i, (p, k) in enumerate(before.where)}
     for p, (pair, front, numbers) in enumerate(zip(pairs, fronts, index, strict=True)):
         nodes = nodes_of(pair, front, numbers)
         gap = pair.gap[nodes]
@@ -156,9 +105,9 @@ def make_friction(
         direction[:, 0] = 1.0
         for j, node in enumerate(nodes):
             i = known.get((p, int(node)))
-            if i is not None:
-                status[j] = memory.status[i]
-                direction[j], reference[j] = memory.direction[i], memory.reference[i]
+            if before is not None and i is not None:
+                status[j] = before.states.status[i]
+                direction[j], reference[j] = before.states.direction[i], before.reference[i]
         _add(friction, p, pair, nodes, numbers, status, direction, reference)
     system.set_friction(friction)
 
@@ -181,7 +130,7 @@ def _add(
 def contact_share(
     system: ContactSystem, pair: Pair, index: Ints, nodes: Ints, state: Equilibrium
 ) -> tuple[Array, Ints, Array]:
-    """What contact takes over from the bonds of nodes that are let go.
+    """What contact takes over from the bonds of nodes that are released.
 
     Pressure stays, and so does shear up to mu times the pressure: what exceeds it is released.
 
@@ -241,7 +190,7 @@ def release_to_contact(
 
 
 __all__ = [
-    "FrictionMemory",
+    "FrictionWork",
     "contact_share",
     "has_friction",
     "make_friction",

@@ -230,11 +230,5 @@ class GrowingCholesky:
         self._inverse = self._inverse[: first // _BLOCK]
         return first
 
-    def back_unit(self, position: int) -> Array:
-        """Row of the inverse, S[free, free]^-1 e_position, shape (n_free,)."""
-        unit = np.zeros(len(self.free))
-        unit[position] = 1.0
-        return self.backward(self.forward(unit, start=position))
-
 
 __all__ = ["GrowingCholesky", "NotPositiveDefinite"]

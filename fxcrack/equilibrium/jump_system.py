@@ -1,6 +1,6 @@
-"""The interface alone: dense equilibrium of the window on S, states as they are.
+"""The interface alone: dense equilibrium of the retained jumps on S, states as they are.
 
-Every window component is either held (its jump is known, its force follows) or free (its force is
+Every retained jump is either held (its jump is known, its force follows) or free (its force is
 known, its jump follows):
 
     S_ff delta_f = p_f - S_fL a - S_fh delta_h,       p_h = S_hf delta_f + S_hh delta_h + S_hL a
@@ -20,6 +20,7 @@ import numpy as np
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.equilibrium.cohesive_bonds import CohesiveBonds
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
+from fxcrack.equilibrium.coulomb import FrictionState
 from fxcrack.equilibrium.growing_cholesky import GrowingCholesky, NotPositiveDefinite
 
 _PROPORTIONAL = 4.0 * np.finfo(float).eps
@@ -46,30 +47,33 @@ class Equilibrium:
 
 
 @dataclass(frozen=True)
-class Snapshot:
-    """States to return to.
+class ComponentStates:
+    """States of the retained jumps.
 
     Attributes:
-        free: Components whose force is known.
-        closed: Normal components in contact.
+        free: Components whose force is known, shape (n_retained,).
+        closed: Normal components in contact, shape (n_retained,).
+        contact: Normal components that may be in contact, shape (n_retained,).
         bonds: Softening bonds.
         finished: Energy dissipated by those that have opened all the way.
-        friction: States of the frictional contact nodes, if there are any.
+        friction: What the contact nodes with friction remember
+            (:class:`FrictionState`), if there are any.
     """
 
     free: Bools
     closed: Bools
+    contact: Bools
     bonds: list[CohesiveBond]
     finished: float
-    friction: object = None
+    friction: FrictionState | None = None
 
 
 class JumpSystem:
-    """States of the window components and the linear equilibrium they lead to.
+    """States of the retained jumps and the linear equilibrium they lead to.
 
     Args:
-        schur: S over (window, supports, force patterns, monitors).
-        n_retained: Number of window components.
+        schur: S over (retained jumps, supports, force patterns, monitors).
+        n_retained: Number of retained jumps.
         n_loads: Number of supports and force patterns together.
         n_forces: How many of these are force patterns (the last ones).
         offset: c, shape (len(schur),); ``None`` for a linear continuum.
@@ -80,7 +84,7 @@ class JumpSystem:
         contact: Normal components that may be in contact now, shape (n_retained,).
         touches: Normal components that may be in contact once their bond is gone, likewise.
         gap: Initial gaps, shape (n_retained,), length.
-        contact_steps: Number of active-set steps done.
+        contact_steps: Number of active-set steps done, those on earlier sets of jumps included.
         seconds: Time spent following contact, friction or softening, by law.
     """
 
@@ -186,17 +190,18 @@ class JumpSystem:
         self.release(free)
         self.contact[free] |= self.touches[free]
 
-    def snapshot(self) -> Snapshot:
+    def snapshot(self) -> ComponentStates:
         """What :meth:`restore` needs to return to the present states."""
-        return Snapshot(
+        return ComponentStates(
             self.free.copy(),
             self.closed.copy(),
+            self.contact.copy(),
             [replace(b) for b in self.soft.bonds],
             self.soft.finished,
         )
 
-    def restore(self, saved: Snapshot) -> None:
-        """Return to earlier states; only contact and softening may have changed since.
+    def restore(self, saved: ComponentStates) -> None:
+        """Return to earlier states of the same components.
 
         What was held is held first: so nothing comes free on the way.
         """
@@ -204,24 +209,12 @@ class JumpSystem:
         self.soft.bonds = []
         extra = np.flatnonzero(self.free & ~saved.free)
         if len(extra):
-            self.contact[extra[~saved.closed[extra]]] = False
             self.hold(extra)
         self.closed[:] = saved.closed
+        self.contact[:] = saved.contact
         self.release(np.flatnonzero(saved.free & ~self.free))
         self.soft.bonds = saved.bonds
         self.soft.refresh(self.cholesky)
-
-    def state_dict(self) -> dict[str, Array]:
-        """What a checkpoint keeps of every component, each of shape (n_retained,).
-
-        Given loads, open and softening components, it decides the equilibrium.
-        """
-        return {"closed": self.closed.astype(float), "contact": self.contact.astype(float)}
-
-    def load_state_dict(self, states: dict[str, Array]) -> None:
-        """Take what :meth:`state_dict` gave; the same components are open or softening."""
-        self.contact[:] = states["contact"] > 0.0
-        self._set_closed(states["closed"] > 0.0)
 
     def hold(self, components: Ints) -> None:
         """Hold components again (contact)."""
@@ -391,8 +384,8 @@ def work_between(a: Equilibrium, b: Equilibrium, n_forces: int) -> float:
 
 
 def bond_work(a: Equilibrium, b: Equilibrium) -> float:
-    """Energy bonds that are letting go take out along a linear piece, or to a state after it."""
+    """Energy released by bonds whose force falls, on a linear piece or to a state after it."""
     return b.lost - 0.5 * float((a.force + b.force) @ (b.jump - a.jump))
 
 
-__all__ = ["Equilibrium", "JumpSystem", "Snapshot", "blend", "bond_work", "work_between"]
+__all__ = ["ComponentStates", "Equilibrium", "JumpSystem", "blend", "bond_work", "work_between"]

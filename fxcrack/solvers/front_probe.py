@@ -11,7 +11,7 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
-from fxcrack.solvers.base import InterfaceSolver
+from fxcrack.solvers.base import Solver
 
 _UNBOUNDED = 1e100
 """Jump per force of nodes that hold a body alone."""
@@ -25,7 +25,7 @@ class CondensedFrontProbe:
         p: Number of the pair.
     """
 
-    def __init__(self, solver: InterfaceSolver, p: int) -> None:
+    def __init__(self, solver: Solver, p: int) -> None:
         self._solver = solver
         self._p = p
         self.front: Front = solver.fronts[p]

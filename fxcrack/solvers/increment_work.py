@@ -1,7 +1,7 @@
-"""The way from one equilibrium of nonlinear bodies to another, and what was spent on it.
+"""An increment from one equilibrium of nonlinear bodies to another, and its work.
 
-Between two accepted states the dense system holds the tangent: it predicts the way (contact and
-softening followed exactly on it), SNES corrects the end, and the integrals along the way are those
+Between two accepted states the dense system holds the tangent: it predicts the path (contact and
+softening followed exactly on it), SNES corrects the end, and the integrals along the path are those
 of the prediction plus the correction e, whose value and rate are zero at the start:
 
     int_0^1 e ds = e(1)/2 - e'(1)/12      (cubic in s)
@@ -13,31 +13,31 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import ConvergenceError
 from fxcrack.equilibrium.contact import Equilibrium, bond_work
-from fxcrack.equilibrium.jump_system import Snapshot
 
 FINE = 1.0 / 512.0
-"""Part of a way, or of a bond force, that is taken at once whatever the energies are."""
+"""Part of an increment, or of a bond force, that is taken whole whatever the energies are."""
 
 
 class EnergyImbalance(ConvergenceError):
-    """The integrals along a way do not add up to what the bodies have stored: it is too long."""
+    """Work and energies of an increment do not balance: it is too large."""
 
 
 @dataclass(frozen=True)
 class IncrementWork:
-    """The way from one equilibrium to another, loads and given forces linear in s from 0 to 1.
+    """Work along an increment, loads and given forces linear in s from 0 to 1.
 
     Attributes:
         start: Where it begins.
         end: Where it ends.
         conjugate: Integral of the conjugates over s, shape (n_loads,).
         jump: Integral of the jumps over s, shape (n_retained,).
-        bonds: Energy that bonds which are letting go took out on the way.
-        friction: Energy that friction took on the way.
+        bonds: Energy released by bonds whose force falls.
+        friction: Energy dissipated by friction.
     """
 
     start: Equilibrium
@@ -47,41 +47,57 @@ class IncrementWork:
     bonds: float
     friction: float
 
+    def support_work(self, n_forces: int) -> float:
+        """Work of supports, where there are ``n_forces`` force patterns."""
+        n, a, b = len(self.start.loads) - n_forces, self.start.loads, self.end.loads
+        return float(self.conjugate[:n] @ (b - a)[:n])
+
     def external_work(self, n_forces: int) -> float:
         """Work of supports and force patterns, of which there are ``n_forces``."""
         n, a, b = len(self.start.loads) - n_forces, self.start.loads, self.end.loads
-        work = self.conjugate[:n] @ (b - a)[:n]
-        work += b[n:] @ self.end.conjugate[n:] - a[n:] @ self.start.conjugate[n:]
-        work -= self.conjugate[n:] @ (b - a)[n:]
-        return float(work)
+        by_forces = b[n:] @ self.end.conjugate[n:] - a[n:] @ self.start.conjugate[n:]
+        by_forces -= self.conjugate[n:] @ (b - a)[n:]
+        return self.support_work(n_forces) + float(by_forces)
 
 
-@dataclass(frozen=True)
+@dataclass
 class TrialIncrement:
-    """What is known of a trial before it is confirmed.
+    """An equilibrium that was found, before it is accepted.
 
     Attributes:
-        saved: The dense system's states before it.
-        points: Pieces of the predicted way with the fraction at which each ends.
+        points: Pieces of the predicted path with the fraction at which each ends.
         end: The equilibrium found.
         rate: Rates of jumps and conjugates at the start, by the tangent there.
         soft: Components that softened at the start.
         iterations: Iterations it took.
-        friction: Energy that friction took.
+        friction: Energy dissipated by friction.
+        at: Time of the end.
+        u: Displacement of the end, owned dofs.
+        values: Forces of the last coordinates and values of the borders there, shape (n_last,).
+        drift: What was out of balance where the tangent at hand was made, over the forces.
+        noise: What the energies along the path are known to.
+        energies: Energies stored at the end, by name, ``None`` before they are asked for.
+        work: Work along the path, ``None`` before it is confirmed.
     """
 
-    saved: Snapshot
     points: list[tuple[float, Equilibrium]]
     end: Equilibrium
     rate: tuple[Array, Array]
     soft: Ints
     iterations: int
     friction: float
+    at: float
+    u: PETSc.Vec
+    values: Array
+    drift: float
+    noise: float
+    energies: dict[str, float] | None = None
+    work: IncrementWork | None = None
 
     def integrals(
         self, after: tuple[Array, Array], soft: Ints, *, trapezoidal: bool
     ) -> IncrementWork:
-        """What the way took.
+        """Work along the increment.
 
         Args:
             after: Rates of jumps and conjugates at the end, by the tangent there.

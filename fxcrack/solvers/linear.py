@@ -1,117 +1,201 @@
-"""The linear continuum as its interfaces see it: one factorisation, then dense algebra.
+"""Linear bodies: condensed once per set of retained jumps, then dense algebra.
 
-A :class:`LinearSolver` knows which nodes are bonded, open or in contact, gives equilibrium
-states for loads, bond forces and openings at the tips, and lets nodes go. It factors again only
-when the front leaves the window.
+The stiffness does not change while the crack grows, so equilibria, releases and energies need the
+condensed bodies only. They are condensed again when a front leaves the retained jumps.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+import time
 
 import numpy as np
 from petsc4py import PETSc
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import ComesApart
-from fxcrack.equilibrium.cohesive_law import CohesiveBond, CohesiveUnit
-from fxcrack.equilibrium.contact import Equilibrium, bond_work, work_between
-from fxcrack.equilibrium.friction_state import release_to_contact
+from fxcrack.base.machine import machine_memory_mb
+from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
+from fxcrack.condensation.cost_laws import too_large_for_direct
+from fxcrack.condensation.direct import DirectCondensation
+from fxcrack.condensation.iterative import IterativeCondensation, Roles, SchurColumnCache
+from fxcrack.condensation.options import CondensedOptions
+from fxcrack.condensation.retained import ColumnCost, CostModel
+from fxcrack.condensation.rigid_motions import check_held
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, work_between
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
-from fxcrack.solvers.base import InterfaceSolver
+from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
+from fxcrack.interface.jump_coordinates import build_coordinates
+from fxcrack.interface.pairing import Pair
+from fxcrack.interface.supports import Supports
+from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
+
+_ROUND_OFF = 1e-12
+"""Of an entry of S, by the diagonal of A. Measured on pivots, the energy v^t S v of a motion v over
+sum A_ii v_i^2: at most 2e-15 where nothing holds a body, nearly incompressible or not; of those
+held 7e-10 or more in slender bodies (900 to 1), 1e-10 in thin ones (50 to 1) that are 1e4 times
+softer than their slaves, 1e-12 where they are 1e7 times softer."""
 
 
 class LinearSolver(InterfaceSolver):
-    """Bodies, interfaces and loads, condensed: nodes let go, energies, fields.
+    """Linear bodies, interfaces and loads.
 
-    Arguments as for :class:`~fxcrack.solvers.base.InterfaceSolver`.
+    Args:
+        continuum: Bodies.
+        pairs: Interfaces.
+        supports: Prescribed components.
+        loads: Force patterns; those of a temperature come last.
+        monitors: Monitored displacements.
+        options: How to condense.
+
+    Attributes:
+        stiffness: K, once assembled.
+        borders: Force patterns with the minus sign, then monitors, once assembled.
+        condensation: The condensed bodies, once there are any.
+        columns: Columns computed by iteration, ``None`` where the bodies are factored.
     """
 
-    def soften(self, p: int, units: Sequence[CohesiveUnit]) -> None:
-        """Let the bond forces of units fall linearly with their opening.
+    def __init__(
+        self,
+        continuum: Continuum,
+        pairs: list[Pair],
+        supports: Supports,
+        loads: list[Load],
+        monitors: list[Monitor],
+        options: CondensedOptions,
+    ) -> None:
+        super().__init__(continuum, pairs, supports, loads, monitors, options)
+        self.stiffness: PETSc.Mat | None = None
+        self.borders: list[PETSc.Vec] = []
+        self.condensation: DirectCondensation | IterativeCondensation | None = None
+        self.columns: SchurColumnCache | None = None
+        if options.method == "iterative" or (options.method == "auto" and self._too_large()):
+            self._cost = ColumnCost.guess(continuum.n_global)
+            self.columns = SchurColumnCache(
+                continuum, pairs, supports, rtol=options.rtol, cap_mb=options.window_mb
+            )
+        self._n_thermal = sum(isinstance(x, ThermalLoad) for x in loads)
+        self._held_energies: Array | None = None
 
-        The forces of all nodes of a unit fall in proportion. Where its faces are pressed together,
-        normal forces that press stay: these nodes are in contact from then on.
+    def _too_large(self) -> bool:
+        """Whether a factorisation would not fit the memory, which is logged; collective."""
+        if self.continuum.gdim < 3:
+            return False
+        comm = self.continuum.comm
+        reason = too_large_for_direct(self.continuum.n_global, 1e6 * machine_memory_mb(comm))
+        if reason is not None:
+            log.warn("%s: the iterative method is used (method='schur' insists)", reason)
+        return reason is not None
 
-        Args:
-            p: Number of the pair.
-            units: What softens by one law each; bonded so far.
+    # -- condensation --------------------------------------------------------------------
 
-        Raises:
-            NotPositiveDefinite: A body would come free; nothing is changed.
-        """
-        system, state = self.system, self.state
-        bonds, force = [], state.force.copy()
-        for nodes, spend, pressed in units:
-            row, local = np.nonzero(self.index[p][nodes] >= 0)
-            components = self.index[p][nodes[row], local]
-            traction = -system.forces(state, components)
-            if pressed:
-                stays = (local == 0) & (traction < 0.0)
-                closed = components[stays]
-                system.contact[closed] = system.closed[closed] = True
-                row, local, components, traction = (
-                    v[~stays] for v in (row, local, components, traction)
-                )
-            strength = float(np.linalg.norm(traction))
-            if not strength > 0.0:
-                system.release(components)
-                continue
-            force[components] = -traction
-            bonds.append(
-                CohesiveBond(
-                    components, traction / strength, strength, 2.0 * spend / strength,
-                    (p, nodes[row], local),
-                )
-            )  # fmt: skip
-        every = np.concatenate([unit.nodes for unit in units])
-        self.fronts[p].release(every)
-        if bonds:
-            system.soften(bonds)
-            if self.pairs[p].interface.contact:
-                normals = self.index[p][every, 0]
-                system.touches[normals[normals >= 0]] = True
-        self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
+    def _assembled(self) -> PETSc.Mat:
+        """K; it and the borders are made on first use; collective."""
+        if self.stiffness is None:
+            start = time.perf_counter()
+            check_held(self.continuum, self.supports)
+            self.continuum.compile()
+            self.timings.add("compile", start)
+            start = time.perf_counter()
+            self.stiffness = self.continuum.stiffness()
+            self.borders = load_and_monitor_vectors(
+                self.continuum, self.loads, self.monitors, self._followed
+            )
+            self.timings.add("assemble", start)
+        return self.stiffness
 
-    def open(self, p: int, nodes: Ints) -> None:
-        """Make the forces of nodes known instead of their jumps; they keep their values.
+    def _condense(self, roles: Roles, loads: Array) -> Condensed:
+        stiffness = self._assembled()
+        if self.condensation is not None:
+            self.condensation.destroy()
+            self.condensation = None
+        found: DirectCondensation | IterativeCondensation
+        if self.columns is None:
+            found = direct = self._factored(stiffness, roles)
+        else:
+            found = self._by_columns(self.columns, stiffness, roles)
+        self.condensation = found
+        coordinates = found.coordinates
+        n_forces = len(self.loads)
+        system = ContactSystem(found.schur, coordinates.n_retained, self.n_loads, n_forces)
+        if self.columns is None:
+            # a body that is nearly incompressible has a much larger diagonal than S
+            system.cholesky.round_off = _ROUND_OFF * np.abs(direct.diagonal)
+        face_loads = -found.borders_on_retained[:, :n_forces]
+        # a temperature acts on no face; its force on a node at an end does not follow the crack
+        face_loads[:, n_forces - self._n_thermal :] = 0.0
+        return Condensed(coordinates, system, face_loads)
 
-        Raises:
-            NotPositiveDefinite: A body would come free; nothing is changed.
-        """
-        system, state = self.system, self.state
-        if system.friction is not None and self.pairs[p].interface.contact:
-            force = release_to_contact(system, p, self.pairs[p], self.index[p], nodes, state)
-            self.fronts[p].release(nodes)
-            self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
-            return
-        components = self.components(p, nodes)
-        components = components[~system.free[components]]
-        force = state.force.copy()
-        force[components] = system.forces(state, components)
-        system.release(components)
-        self.fronts[p].release(nodes)
-        if self.pairs[p].interface.contact:
-            self._let_touch(self.pairs[p], self.fronts[p], self.index[p])
-        self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
+    def _factored(self, stiffness: PETSc.Mat, roles: Roles) -> DirectCondensation:
+        """The bodies condensed by a factorisation; collective."""
+        start = time.perf_counter()
+        coordinates = build_coordinates(
+            self.continuum.layout, self.pairs, roles, self.supports, len(self.borders)
+        )
+        self.timings.add("transform", start)
+        start = time.perf_counter()
+        found = DirectCondensation(
+            stiffness, coordinates, self.borders, self.timings, method=self.options.method
+        )
+        seconds = self.continuum.comm.bcast(time.perf_counter() - start)
+        assert isinstance(self._cost, CostModel)
+        self._cost.observe(coordinates.n_retained, seconds)
+        return found
+
+    def _by_columns(
+        self, columns: SchurColumnCache, stiffness: PETSc.Mat, roles: Roles
+    ) -> IterativeCondensation:
+        """The bodies condensed by columns of S, no factorisation; collective."""
+        may_open = []
+        for pair, front, on in zip(self.pairs, self.fronts, self.active, strict=True):
+            later = np.zeros((pair.surface.n_nodes, self.continuum.gdim), dtype=bool)
+            later[front.bonded & pair.paired] = on
+            if pair.interface.normal_only:
+                later[:, 1:] = False
+            may_open.append(later)
+        start = time.perf_counter()
+        made = columns.condense(roles, may_open, stiffness, self.borders, self.timings)
+        spent = self.continuum.comm.bcast((made.column_seconds, time.perf_counter() - start))
+        assert isinstance(self._cost, ColumnCost)
+        self._cost.observe(made.computed, *spent)
+        log.info("%d new columns in %.2f s", made.computed, made.column_seconds)
+        return made
+
+    # -- from equilibrium to equilibrium -------------------------------------------------
+
+    def _equilibrium(self, before: InterfaceState, force: Array) -> Equilibrium:
+        system, loads = self.system, before.equilibrium.loads
+        if system.friction is None:
+            return system.linear(loads, force)
+        # what slips and what sticks cannot be told from the loads: the jumps say it
+        jump = before.values(before.equilibrium.jump, self.index, system.n_retained)
+        held = system.friction.over(system.friction.of(jump), system.n_retained)
+        return system.linear(loads, force, held)
+
+    def start(self) -> None:
+        """Find the equilibrium without loads; collective."""
+        zero = np.zeros(self.system.n_retained)
+        self.state = self.system.equilibrium(np.zeros(self.n_loads), zero)
 
     def release(self, p: int, nodes: Ints, force: Array) -> tuple[float, float]:
-        """Let nodes go at constant load and find the new equilibrium.
+        """Release nodes at constant load and find the new equilibrium.
 
         Args:
             p: Number of the pair.
-            nodes: Slave nodes.
+            nodes: Slave nodes, shape (n,).
             force: Given forces afterwards, shape (n_retained,).
 
         Returns:
-            Energy set free by the bond forces on their way, and external work.
+            Energy released by the bond forces on their way, and external work.
 
         Raises:
             NotPositiveDefinite: A body would come free; nothing is changed.
             ComesApart: So it would once bonds that soften have opened; likewise.
         """
-        before, saved, spent = self.state, self.remember(), self.friction_energy
+        saved = self.interface_state()
         self.open(p, nodes)
         released, work, last = 0.0, 0.0, self.state
         try:
@@ -121,28 +205,41 @@ class LinearSolver(InterfaceSolver):
                 self.book_friction(last, point)
                 last = point
         except (NotPositiveDefinite, ComesApart):
-            self.state, self.friction_energy = before, spent
-            self.fronts[p].bond(nodes)
-            self.recall(saved)
+            self.restore_interfaces(saved)
             raise
         self.state = last
         return released, work
 
     def commit(self) -> None:
-        """The present state is good; linear bodies remember nothing else."""
+        """The present state is accepted; linear bodies remember nothing else."""
 
-    def remember(self) -> Any:
-        """What :meth:`recall` needs to return to the present state, with the same bonds."""
-        return self.system.snapshot()
+    def remember(self) -> InterfaceState:
+        """What :meth:`recall` needs to return to the present state."""
+        return self.interface_state()
 
-    def recall(self, saved: Any) -> None:
-        """Return to an earlier state; ``state`` itself is the caller's to set before."""
-        self.system.restore(saved)
+    def recall(self, saved: InterfaceState) -> None:
+        """Return to an earlier state on the same retained jumps."""
+        self.restore_interfaces(saved)
+
+    def collect(self) -> Arrays:
+        """The present state as plain arrays; see :meth:`InterfaceState.arrays`."""
+        return self.interface_state().arrays()
+
+    def resume(self, arrays: Arrays, time: float) -> None:
+        """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over."""
+        self._resume(InterfaceState.from_arrays(arrays, len(self.pairs)))
+
+    # -- energies and fields -------------------------------------------------------------
 
     def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
         """External work, energy out through bonds, mean jumps of a linear piece."""
         work = work_between(here, point, len(self.loads))
         return work, bond_work(here, point), 0.5 * (here.jump + point.jump)
+
+    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Add the energy friction dissipates along a linear piece."""
+        if self.system.friction is not None:
+            self.friction_energy += self.system.friction.dissipation(self.system, here, point)
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies, by name; collective."""
@@ -164,26 +261,19 @@ class LinearSolver(InterfaceSolver):
         """
         if not self._n_thermal:
             return 0.0
-        if self._held is None:
-            from fxcrack.continuum.thermal_strain import held_energies
-
-            self._held = held_energies(self.continuum)
+        if self._held_energies is None:
+            self._held_energies = held_energies(self.continuum)
         factors, answers = state.loads[-self._n_thermal :], state.conjugate[-self._n_thermal :]
-        return float(0.5 * factors @ self._held @ factors - factors @ answers)
-
-    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
-        """Account for the energy friction takes along a linear piece."""
-        if self.system.friction is not None:
-            self.friction_energy += self.system.friction.dissipation(self.system, here, point)
+        return float(0.5 * factors @ self._held_energies @ factors - factors @ answers)
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Displacement vector of a state; collective; the caller destroys it."""
         state = self.state if state is None else state
-        assert self._condensation is not None
+        assert self.condensation is not None
         last = np.zeros(len(self.system.schur))
         last[: self.system.n_retained] = state.jump
         last[self.system.n_retained : self.system.n_retained + self.n_loads] = state.loads
-        return self._condensation.displacement(last)
+        return self.condensation.displacement(last)
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies, K u - f.
@@ -195,11 +285,25 @@ class LinearSolver(InterfaceSolver):
             state: The state whose loads act; the present one by default.
         """
         state = self.state if state is None else state
-        assert self._stiffness is not None
-        out = self._stiffness.createVecLeft()
-        self._stiffness.mult(u, out)
+        stiffness = self._assembled()
+        out = stiffness.createVecLeft()
+        stiffness.mult(u, out)
         # the first borders are the force patterns with the minus sign; monitors follow
         factors = state.loads[self.n_loads - len(self.loads) :]
-        for factor, border in zip(factors, self._borders, strict=False):
+        for factor, border in zip(factors, self.borders, strict=False):
             out.axpy(float(factor), border)
         return out
+
+    def destroy(self) -> None:
+        """Free all PETSc objects; collective."""
+        if self.condensation is not None:
+            self.condensation.destroy()
+            self.condensation = None
+        if self.columns is not None:
+            self.columns.destroy()
+        for vector in self.borders:
+            vector.destroy()
+        if self.stiffness is not None:
+            self.stiffness.destroy()
+            self.stiffness = None
+        self.borders = []

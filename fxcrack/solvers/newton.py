@@ -1,62 +1,215 @@
-"""Trials of a nonlinear model: from one equilibrium to the next, kept or forgotten.
+"""Nonlinear bodies: from one equilibrium to the next, accepted or given up.
 
-Between two accepted states the dense system holds the tangent: it predicts the way, SNES corrects
+Between two accepted states the dense system holds the tangent: it predicts the path, SNES corrects
 the end (:mod:`fxcrack.solvers.increment_work`).
 """
 
 from __future__ import annotations
 
 import time
-from typing import Any
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import ConvergenceError
-from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.equilibrium.friction_state import Slide
+from fxcrack.base.errors import ConvergenceError, InputError
+from fxcrack.condensation.iterative import Roles
+from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.continuum.weak_form import WeakForm
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
-from fxcrack.equilibrium.jump_system import Snapshot
-from fxcrack.solvers import snes as newton
+from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
+from fxcrack.interface.jump_coordinates import build_coordinates
+from fxcrack.interface.pairing import Pair
+from fxcrack.interface.supports import Supports
+from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
 from fxcrack.solvers.increment_work import FINE, EnergyImbalance, IncrementWork, TrialIncrement
-from fxcrack.solvers.snes import InterfaceSnes
+from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
+from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
+from fxcrack.solvers.trial import IncrementSolver
 
-_FAR_OFF = 1e-5
-"""A tangent made where more than this part of the forces was out of balance gives way to that of
-the state itself when one is accepted."""
-_NOISE = 10.0
-"""Energies on a way may be off by so many times the residual left times the step."""
+_SMALLEST_PIECE = 1e-4
+"""Part of a bond force whose removal is the least that is tried at once."""
 _UNSTABLE = (
     "the equilibrium found is unstable (buckling, or a limit load was passed); take smaller "
     "increments, or control a displacement instead of a force"
 )
 
 
-class NewtonTrial(CondensedTangent):
-    """Nonlinear bodies that move from equilibrium to equilibrium.
-
-    Arguments as for :class:`~fxcrack.solvers.tangent.CondensedTangent`.
+@dataclass(frozen=True)
+class NewtonState:
+    """An accepted state to return to.
 
     Attributes:
-        last_move: The last trial.
-        largest_energy: The largest one stored in an accepted state that was looked at.
+        interfaces: State of the interfaces.
+        pairs: Their pairing.
+        u: Displacement, dofs owned by this rank.
+        terms: States of the form terms.
+        at: Time.
+        pairing_energy: Energy that new pairings have taken so far.
     """
 
-    def __init__(self, *parts: Any, **controls: Any) -> None:
-        super().__init__(*parts, **controls)
-        self._trial_at = 0.0
+    interfaces: InterfaceState
+    pairs: list[Pair]
+    u: Array
+    terms: list[dict[str, Array]]
+    at: float
+    pairing_energy: float
+
+
+class _Dense(NamedTuple):
+    """The dense system of a checkpoint, the numbering it is in, and its tangent's drift."""
+
+    numbers: list[Ints]
+    schur: Array
+    offset: Array
+    face_loads: Array
+    drift: float
+
+
+class NewtonSolver(InterfaceSolver):
+    """Nonlinear bodies, interfaces and loads.
+
+    Args:
+        continuum: Displacement space.
+        pairs: Interfaces.
+        supports: Prescribed components.
+        loads: Force patterns.
+        monitors: Monitored displacements.
+        options: How to condense.
+        bodies: The form terms.
+        newton: Controls of the iteration.
+
+    Raises:
+        InputError: The options ask for a way to condense that only linear bodies allow.
+
+    Attributes:
+        tangent: The bodies' condensed tangent.
+        interfaces: The interfaces as the displacement has them.
+        u: Accepted displacement, owned dofs.
+        at: Time of the accepted state.
+        counts: Solves and iterations so far.
+        largest_force: Largest norm of the internal forces of an accepted state, force.
+        largest_energy: The largest one stored in an accepted state that was asked for it.
+        pairing: Energy that new pairings of faces that slide have taken.
+        exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
+            crack closure: it is that of every state then.
+    """
+
+    def __init__(
+        self,
+        continuum: Continuum,
+        pairs: list[Pair],
+        supports: Supports,
+        loads: list[Load],
+        monitors: list[Monitor],
+        options: CondensedOptions,
+        *,
+        bodies: WeakForm,
+        newton: NewtonOptions,
+    ) -> None:
+        super().__init__(continuum, pairs, supports, loads, monitors, options)
+        if options.method == "iterative":
+            raise InputError(
+                "method='iterative' keeps its columns while the crack grows, which needs linear "
+                "bodies; use method='auto' with nonlinear ones"
+            )
+        self.bodies = bodies
+        self.newton = newton
+        self.tangent = CondensedTangent(
+            bodies, supports, loads, monitors, method=options.method, timings=self.timings
+        )
+        self._increments = IncrementSolver(self.tangent, newton, self.n_loads, len(loads))
+        self.counts = self._increments.counts
+        self.interfaces = DeformedInterfaces(continuum, pairs, self.fronts, finite=bodies.finite)
+        size = continuum.n_local, continuum.n_global
+        self.u = PETSc.Vec().createMPI(size, comm=continuum.comm)
+        self.at = 0.0
+        self.largest_force = self.largest_energy = 0.0
+        self.pairing = PairingEnergy()
+        self.exact = False
+        self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
-        self._trial: PETSc.Vec | None = None
-        self._trial_drift = 0.0
-        self._energies: dict[str, float] | None = None  # of the accepted state, once looked at
-        self._trial_energies: dict[str, float] | None = None
-        self._noise = 0.0  # of the energies on the way to the trial
-        self.largest_energy = 0.0
-        self._answers = np.zeros(0)  # forces of the last coordinates at the trial's end
-        self._way: TrialIncrement | None = None  # to a trial that is not confirmed yet
-        self.last_move: IncrementWork | None = None
+        self._trial: TrialIncrement | None = None
+        self._last: IncrementWork | None = None  # of the last trial that was confirmed
+        self._energies: dict[str, float] | None = None  # of the accepted state, once asked for
+        self._resumed_dense: _Dense | None = None
+
+    # -- condensation --------------------------------------------------------------------
+
+    def _condense(self, roles: Roles, loads: Array) -> Condensed:
+        tangent, n_forces = self.tangent, len(self.loads)
+        n_borders = tangent.assemble(self._followed)
+        tangent.release_memory()
+        start = time.perf_counter()
+        coordinates = build_coordinates(
+            self.continuum.layout, self.pairs, roles, self.supports, n_borders
+        )
+        self.timings.add("transform", start)
+        self.bodies.set(self.u)
+        tangent.condense(coordinates)
+        system = ContactSystem(
+            tangent.condensation.schur, coordinates.n_retained, self.n_loads, n_forces,
+            offset=np.zeros(coordinates.n_last),
+        )  # fmt: skip
+        residual = tangent.out_of_balance(loads)
+        jump = self.interfaces.jumps(self.u, coordinates)
+        tangent.anchor(system, residual, jump, loads).destroy()
+        residual.destroy()
+        face_loads = -tangent.condensation.borders_on_retained[:, :n_forces]
+        return Condensed(coordinates, system, face_loads)
+
+    def _equilibrium(self, before: InterfaceState, force: Array) -> Equilibrium:
+        jump = self.interfaces.jumps(self.u, self.tangent.coordinates)
+        return Equilibrium(before.equilibrium.loads, force, jump, before.equilibrium.conjugate)
+
+    def prepare(self, active: list[bool], reach: list[float]) -> None:
+        """Choose the retained jumps for a step, and condense; collective.
+
+        Arguments as for :meth:`InterfaceSolver.prepare`.
+        """
+        super().prepare(active, reach)
+        dense, self._resumed_dense = self._resumed_dense, None
+        if dense is not None and all(map(np.array_equal, dense.numbers, self.index)):
+            # a resumed step goes on as it would have, to round-off
+            self.system.renew(dense.schur, dense.offset)
+            self.face_loads = dense.face_loads
+            self.tangent.drift = dense.drift
+
+    def renew_pairs(self) -> bool:
+        """Pair open nodes with the master surface where it is now; collective.
+
+        Returns:
+            Whether a pair has changed; the dense system is then another one, and the caller
+            goes on to its equilibrium (:meth:`settle`).
+        """
+        changed = self.interfaces.pair_anew(self.u)
+        if changed:
+            self.rebase()
+            if self.system.friction is not None:
+                # slips so far, in the jumps of the present pairing
+                self.system.friction.commit(self.state.jump)
+        return changed
+
+    # -- trials --------------------------------------------------------------------------
+
+    def start(self) -> None:
+        """Find the equilibrium without loads; collective."""
+        zero = np.zeros(self.system.n_retained)
+        self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
+        self._solve(zero)
+
+    def _solve(self, force: Array) -> None:
+        """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
+        if self.bodies.dynamic:
+            force = self.state.force  # nothing happens in no time
+        self.move(self.state.loads, force, self.at, 0.0, follow=False)
+        self.commit()
 
     def move(
         self,
@@ -71,7 +224,7 @@ class NewtonTrial(CondensedTangent):
     ) -> Equilibrium:
         """Find the equilibrium at other loads and given forces; collective.
 
-        The result is a trial until :meth:`accept`; :meth:`reject` forgets it. The dense system's
+        The result is a trial until :meth:`commit`; :meth:`revert` gives it up. The dense system's
         contact and softening states are those of the trial.
 
         Args:
@@ -79,235 +232,141 @@ class NewtonTrial(CondensedTangent):
             force: Shape (n_retained,).
             at: Time of the end.
             dt: Time since the accepted state.
-            follow: Follow contact and softening on the way; else go straight to the end.
-            confirm: Call :meth:`confirm` as well; else it must be before :meth:`accept`.
+            follow: Follow contact and softening on the path; else go straight to the end.
+            confirm: Call :meth:`confirm` as well; else it must be before :meth:`commit`.
             strict: What :meth:`confirm` gets.
 
         Raises:
             ConvergenceError: None was found; the accepted state is in force again.
         """
-        here = self.state
         if self.bodies.closed:
-            self.stored(here)
-        saved = self.system.snapshot()
-        self._trial_at = at
+            self.stored(self.state)
+        self._before = self.interface_state()
         dynamic = self.bodies.dynamic
         self._begun = dt > 0.0 or not dynamic
         if self._begun:
             self.bodies.begin(at, dt)
-        start = time.perf_counter()
-        points = [(0.0, here)]
-        if follow and not dynamic:
-            points += self.system.pieces(here, loads, force)
-        else:
-            points.append((1.0, self.system.equilibrium(loads, force)))
-        predicted = points[-1][1]
-        rate = self.system.rates(loads - here.loads, force - here.force)
-        slide = None if self.system.friction is None else Slide.of(self.system, points)
-        self.timings.add("interface", start)
-        soft = self.system.soft.components
-        y = self._toward(predicted)
-        rows = np.arange(self.system.n_retained)
-        problem = InterfaceSnes(self, loads, force, self.system.forces(predicted, rows))
-        self.counts.residuals = []
         try:
-            iterations = newton.solve(problem, y)
-            end = self._end(problem, y, predicted, loads)
+            trial = self._increments.find(
+                self.system, self.state, self.u, loads, force, at,
+                follow=follow and not dynamic, largest_force=self.largest_force,
+            )  # fmt: skip
         except ConvergenceError:
-            self._fail(saved)
+            self._fail()
             raise
-        finally:
-            problem.destroy()
-            y.destroy()
-        self.counts.solves += 1
-        self.counts.iterations += iterations
-        self._trial_drift = problem.drift + (0.0 if problem.renewed else self.drift)
-        friction = 0.0 if slide is None else slide.energy(self.system, end)
-        self._way = TrialIncrement(saved, points, end, rate, soft, iterations, friction)
-        self.last_move = None
+        self.interfaces.move_fronts(trial.u)
+        self._give_up()
+        self._trial = trial
         if confirm:
             self.confirm(strict=strict)
-        return end
-
-    def _fail(self, saved: Snapshot) -> None:
-        self.counts.failures += 1
-        self.revert(saved)
+        return trial.end
 
     def confirm(self, *, strict: bool = False) -> None:
-        """Have the tangent of the trial where it counts, and the integrals along the way to it.
+        """Have the tangent of the trial where it counts, and the work along the increment.
 
         Collective.
 
         Args:
-            strict: Refuse a way whose integrals do not add up, where bodies store all work.
+            strict: Refuse an increment whose energies do not balance, where bodies store all work.
 
         Raises:
-            EnergyImbalance: So it is; the accepted state is in force again.
+            EnergyImbalance: They do not; the accepted state is in force again.
             ConvergenceError: The equilibrium is unstable; likewise.
         """
-        way = self._way
-        assert way is not None
-        here, end, iterations = way.points[0][1], way.end, way.iterations
-        trapezoidal = self.bodies.dynamic or self.bodies.path_dependent
-        limit = 0.0 if self.exact else np.inf if trapezoidal else _FAR_OFF
+        trial = self._trial
+        assert trial is not None
         try:
-            if iterations and self._trial_drift > limit and not self.bodies.constant:
-                self._factor()
-                self._through(end)
-                self._trial_drift = 0.0
-            if self._kept is not None and self.condensation.n_negative:
-                raise NotPositiveDefinite(0)
+            self._increments.integrate(trial, self.system, exact=self.exact)
         except NotPositiveDefinite as error:
-            self._fail(way.saved)
+            self._fail()
             raise ConvergenceError(_UNSTABLE) from error
-        after = way.rate
-        if iterations and not trapezoidal:
-            after = self.system.rates(end.loads - here.loads, end.force - here.force)
-        soft = self.system.soft.components
-        self.last_move = way.integrals(after, soft, trapezoidal=trapezoidal)
-        self._way = None
-        self._trial_energies = None
-        if strict and iterations and self.bodies.closed:
-            self._check_balance(way.saved, self.last_move)
+        if strict and trial.iterations and self.bodies.closed:
+            self._check_balance(trial)
 
-    def _check_balance(self, saved: Snapshot, move: IncrementWork) -> None:
-        assert self._energies is not None
-        self._trial_energies = self.bodies.stored()
-        before, after = (sum(e.values()) for e in (self._energies, self._trial_energies))
-        taken = move.bonds + move.friction
-        given = move.external_work(len(self.loads)) + self.bodies.path_work()
-        off = given - (after - before) - taken
+    def _check_balance(self, trial: TrialIncrement) -> None:
+        """Refuse a trial whose energies do not balance."""
+        work = trial.work
+        assert work is not None and self._energies is not None
+        trial.energies = self.bodies.stored()
+        before, after = (sum(e.values()) for e in (self._energies, trial.energies))
+        given = work.external_work(len(self.loads)) + self.bodies.path_work()
+        off = given - (after - before) - work.bonds - work.friction
         size = max(after, self.largest_energy)
-        if abs(off) > self.newton.balance * size + self._noise:
-            self.revert(saved)
+        if abs(off) > self.newton.balance * size + trial.noise:
+            self.revert()
             raise EnergyImbalance(
                 f"the energies of an increment are off by {off:.2e} beside {size:.2e} stored"
             )
 
-    def _toward(self, predicted: Equilibrium) -> PETSc.Vec:
-        """Y of a state on the present tangent."""
-        last = np.zeros(self.coordinates.n_last)
-        n = self.system.n_retained
-        last[:n] = predicted.jump - self._base
-        last[n : n + self.n_loads] = predicted.loads - self.state.loads
-        return self.condensation.expanded(last)
-
-    def _end(
-        self, problem: InterfaceSnes, y: PETSc.Vec, predicted: Equilibrium, loads: Array
-    ) -> Equilibrium:
-        """The equilibrium SNES has found, and the dense system through it."""
-        last = predicted if problem.solution is None else problem.solution
-        values = problem.values
-        n = self.system.n_retained + len(self.supports.columns)
-        borders = self._border_values()
-        conjugate = np.concatenate(
-            [values[self.system.n_retained : n], -borders[: len(self.loads)]]
-        )
-        end = Equilibrium(loads, last.force, last.jump, conjugate)
-        self._answers = np.concatenate([values[:n], borders])
-        self._through(end)
-        trial = self.coordinates.transform.createVecLeft()
-        self.coordinates.transform.mult(y, trial)
-        # forces are known to what the iteration leaves out of balance, and so is their work
-        self._noise = _NOISE * problem.level * float(trial.norm())
-        trial.axpy(1.0, self.u)
-        if self._trial is not None:
-            self._trial.destroy()
-        self._trial = trial
-        self._follow_fronts(trial)
-        return end
-
-    def _through(self, end: Equilibrium) -> None:
-        """Let the dense system of the tangent at hand pass through the trial's end."""
-        x, schur = np.concatenate([end.jump, end.loads]), self.condensation.schur
-        self.system.renew(schur, self._answers - schur[:, : len(x)] @ x)
-
     def commit(self) -> None:
         """The last trial becomes the accepted state; collective."""
-        assert self._trial is not None and self.last_move is not None
+        trial = self._trial
+        assert trial is not None and trial.work is not None
         step = self.u.copy()
-        step.aypx(-1.0, self._trial)
-        self._trial.copy(self.u)
-        self.at = self._trial_at
-        self.largest_force = max(self.largest_force, self.force_scale)
-        self.drift = self._trial_drift
-        self._keep_tangent()
-        self._energies = self._trial_energies
+        step.aypx(-1.0, trial.u)
+        trial.u.copy(self.u)
+        self.at = trial.at
+        self.largest_force = max(self.largest_force, self.tangent.force_scale)
+        self.tangent.drift = trial.drift
+        self.tangent.accept()
+        self._energies = trial.energies
         self.largest_energy = max(self.largest_energy, sum((self._energies or {}).values()))
-        self.state = self.last_move.end
-        self._base = self.state.jump.copy()
-        self._account(step)
+        self.state, self._last = trial.end, trial.work
+        self._give_up()
+        if self.pairing.pending:
+            self.pairing.book(self.nodal_forces(self.u), step, trial.work, len(self.loads))
         step.destroy()
         if self._begun:
             self.bodies.commit()
 
-    def _account(self, step: PETSc.Vec) -> None:
-        """What else there is to book of a step that is accepted; the accepted state is its end."""
+    def revert(self) -> None:
+        """Give up the last trial; collective."""
+        self.restore_interfaces(self._before)
+        self._return()
 
-    def revert(self, saved: Any) -> None:
-        """Forget the last trial; collective.
+    def _fail(self) -> None:
+        self.counts.failures += 1
+        self.revert()
 
-        Args:
-            saved: Snapshot of the dense system's states before it.
-        """
-        self.system.restore(saved)
-        self._back()
+    def _give_up(self) -> None:
+        """Forget the trial."""
+        if self._trial is not None:
+            self._trial.u.destroy()
+            self._trial = None
 
-    def stored(self, state: Equilibrium) -> dict[str, float]:
-        """Energies stored in the bodies in the accepted state, by name; collective."""
-        if self._energies is None:
-            self._energies = super().stored(state)
-        return self._energies
-
-    def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
-        """External work, energy out through bonds, mean jumps of the last move."""
-        move = self.last_move
-        assert move is not None and move.start is here and move.end is point
-        return move.external_work(len(self.loads)), move.bonds, move.jump
-
-    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
-        """Account for the energy friction took in the last move."""
-        move = self.last_move
-        assert move is not None and move.start is here and move.end is point
-        self.friction_energy += move.friction
-
-    def _back(self) -> None:
+    def _return(self) -> None:
         """Dense system and bodies at the accepted state again."""
-        self._way = None
-        if self._begun and not self.bodies.dynamic:
-            self.bodies.begin(self.at, 0.0)  # pressures and temperature of the accepted state
+        self._give_up()
+        self._begin_again()
+        tangent = self.tangent
         self.bodies.set(self.u)
-        self._follow_fronts(self.u)
-        self._former_tangent()
-        if self._condensation is None or (self.drift == np.inf and not self.bodies.constant):
-            self._factor()
-            self._keep_tangent()
-        self.drift = min(self.drift, 1.0)
-        self.anchor()
+        self.interfaces.move_fronts(self.u)
+        tangent.revert()
+        if not tangent.at_hand or (tangent.drift == np.inf and not self.bodies.constant):
+            tangent.factor()
+            tangent.accept()
+        tangent.drift = min(tangent.drift, 1.0)
+        residual = tangent.out_of_balance(self.state.loads)
+        tangent.anchor(self.system, residual, self.state.jump, self.state.loads).destroy()
+        residual.destroy()
 
+    def _begin_again(self) -> None:
+        """Take pressures and temperature of the accepted state."""
+        if self._begun and not self.bodies.dynamic:
+            self.bodies.begin(self.at, 0.0)
 
-_SMALLEST_PIECE = 1e-4
-"""Part of a bond force whose removal is the least that is tried at once."""
-
-
-class NewtonSolver(NewtonTrial):
-    """Nonlinear bodies, interfaces and loads.
-
-    Arguments as for :class:`~fxcrack.solvers.tangent.CondensedTangent`.
-    """
-
-    def __init__(self, *parts: Any, **controls: Any) -> None:
-        super().__init__(*parts, **controls)
-        self._replaced: PETSc.Vec | None = None  # forces of interfaces before a new pairing
-
-    def start(self) -> None:
-        """Find the equilibrium without loads; collective."""
-        zero = np.zeros(self.system.n_retained)
-        self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
-        self.solve(zero)
+    # -- releases and new pairings -------------------------------------------------------
 
     def release(self, p: int, nodes: Ints, force: Array) -> tuple[float, float]:
-        """Let nodes go at constant load, in as many pieces as the iteration needs.
+        """Release nodes at constant load, in as many pieces as the iteration needs.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, shape (n,).
+            force: Given forces afterwards, shape (n_retained,).
+
+        Returns:
+            Energy released by the bond forces on their way, and external work.
 
         Raises:
             NotPositiveDefinite: A body would come free; nothing is changed.
@@ -339,111 +398,156 @@ class NewtonSolver(NewtonTrial):
             done = to
         return energy, work
 
-    def solve(self, force: Array) -> None:
-        """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
-        if self.bodies.dynamic:
-            force = self.state.force  # nothing happens in no time
-        self.move(self.state.loads, force, self.at, 0.0, follow=False)
-        self.commit()
-
     def settle(self, force: Array) -> float:
         """Find the equilibrium of a new pairing at constant loads, shape (n_retained,); collective.
 
         Contact forces move to the master points of the new pairing, and gaps that are not zero in
         it close. The work of the interfaces on the way, by the trapezoidal rule, less what friction
-        and bonds take, is :attr:`pairing_energy`. With inertia all that happens in the next
+        and bonds take, goes to :attr:`pairing`. With inertia all that happens in the next
         increment.
 
         Returns:
             External work.
         """
-        self._replaced = self.nodal_forces(self.u)
+        self.pairing.begin(self.nodal_forces(self.u))
         if self.bodies.dynamic:
             return 0.0
         here = self.state
-        self.solve(force)
+        self._solve(force)
         self.book_friction(here, self.state)
         return self.along(here, self.state)[0]
 
-    def _account(self, step: PETSc.Vec) -> None:
-        """Book the energy of a change of pairing."""
-        if self._replaced is None:
-            return
-        move = self.last_move
-        assert move is not None
-        after = self.nodal_forces(self.u)
-        after.axpy(1.0, self._replaced)
-        n = self.n_loads - len(self.loads)
-        supports = move.conjugate[:n] @ (move.end.loads - move.start.loads)[:n]
-        given = 0.5 * float(after.dot(step)) - float(supports)
-        self.pairing_energy -= given + move.bonds + move.friction
-        after.destroy()
-        self._forget_replaced()
+    # -- back to an accepted state -------------------------------------------------------
 
-    def _forget_replaced(self) -> None:
-        if self._replaced is not None:
-            self._replaced.destroy()
-            self._replaced = None
+    def remember(self) -> NewtonState:
+        """What :meth:`recall` needs: interfaces, pairing, displacement, state of the terms."""
+        return NewtonState(
+            self.interface_state(),
+            list(self.pairs),
+            self.u.array.copy(),
+            [term.state() for term in self.bodies.terms],
+            self.at,
+            self.pairing.energy,
+        )
 
-    def prepare(self, active: list[bool], reach: list[float]) -> None:
-        """Build the window for a step, as for a linear continuum."""
-        old = self._numbered()
-        super().prepare(active, reach)
-        if old is not None:
-            self._renumber(*old)
-
-    def rebase(self) -> None:
-        """Another window around the present fronts, at the same displacement; collective."""
-        old = self._numbered()
-        super().rebase()
-        assert old is not None
-        self._renumber(*old)
-
-    def _numbered(self) -> tuple[list[Ints], Equilibrium] | None:
-        """Numbers of the window's components and the state in them, once there is one."""
-        return ([i.copy() for i in self.index], self.state) if hasattr(self, "state") else None
-
-    def _renumber(self, numbers: list[Ints], old: Equilibrium) -> None:
-        force = np.zeros(self.system.n_retained)
-        for before, now in zip(numbers, self.index, strict=True):
-            both = (before >= 0) & (now >= 0)
-            force[now[both]] = old.force[before[both]]
-        self.state = Equilibrium(old.loads, force, self._base.copy(), old.conjugate)
-        if self.system.friction is not None:
-            # slips so far, in the jumps of the present pairing
-            self.system.friction.commit(self._base)
-
-    # -- back and forth -------------------------------------------------------------------
-
-    def remember(self) -> Any:
-        """What :meth:`recall` needs: interface states, displacement, state of the terms."""
-        terms = [term.state() for term in self.bodies.terms]
-        books = self.at, self.pairing_energy
-        pairs = list(self.pairs), [index.copy() for index in self.index]
-        return self.system.snapshot(), self.u.array.copy(), terms, books, pairs
-
-    def recall(self, saved: Any) -> None:
-        """Return to an earlier accepted state; ``state`` is the caller's to set before."""
-        states, u, terms, books, (pairs, numbers) = saved
+    def recall(self, saved: NewtonState) -> None:
+        """Return to an earlier accepted state; collective."""
+        self._give_up()
         self._energies = None
-        here = min(self.comm.allgather(np.array_equal(self.u.array_r, u)))
-        self.u.array[:] = u
-        self.at, energy = books
-        for term, kept in zip(self.bodies.terms, terms, strict=True):
+        here = min(self.continuum.comm.allgather(np.array_equal(self.u.array_r, saved.u)))
+        self.u.array[:] = saved.u
+        self.at = saved.at
+        for term, kept in zip(self.bodies.terms, saved.terms, strict=True):
             term.restore(kept)
-        same = all(a is b for a, b in zip(pairs, self.pairs, strict=True))
+        same = all(a is b for a, b in zip(saved.pairs, self.pairs, strict=True))
         if not (same and here):
-            self._keep_tangent()  # that of a state which is gone as well
-            self.drift = np.inf
+            self.tangent.accept()  # that of a state which is given up as well
+            self.tangent.drift = np.inf
         if same:
-            self._base = self.state.jump.copy()
-            self.revert(states)
+            self.restore_interfaces(saved.interfaces)
         else:
-            self.pairs[:] = pairs
-            self._soft, self._taken = states.bonds, states.finished
-            self._rebase()
-            self._renumber(numbers, self.state)
-            if not self.bodies.dynamic:
-                self.solve(self.state.force)
-        self._forget_replaced()
-        self.pairing_energy = energy
+            self._begin_again()
+            self.pairs[:] = saved.pairs
+            saved.interfaces.restore_bonds(self.fronts)
+            self._retain(saved.interfaces)
+        self._return()
+        self.pairing.forget()
+        self.pairing.energy = saved.pairing_energy
+
+    def collect(self) -> Arrays:
+        """The accepted state as plain arrays; collective.
+
+        Returns:
+            What :meth:`InterfaceState.arrays` gives; on rank 0 bodies.* of
+            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; dense.*, the dense system,
+            which need not be that of the accepted displacement; sums.
+        """
+        assert self.system.offset is not None
+        out = self.interface_state().arrays()
+        out |= {f"bodies.{name}": values for name, values in self.bodies.state().items()}
+        for p, known in enumerate(self.interfaces.pairing()):
+            out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
+        out["dense.schur"], out["dense.offset"] = self.system.schur, self.system.offset
+        out["dense.faces"] = self.face_loads
+        sums = self.pairing.energy, self.largest_force, self.largest_energy, self.tangent.drift
+        out["sums"] = np.array(sums)
+        return out
+
+    def resume(self, arrays: Arrays, time: float) -> None:
+        """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
+
+        Collective.
+
+        Args:
+            arrays: The same on all ranks, of any number of ranks.
+            time: Time of the state.
+
+        Raises:
+            InputError: The mesh has its cells in another order than when the state was saved.
+        """
+        self.interfaces.restore_pairing(arrays, "pairing.{}[{}]")
+        if self.continuum.temperature is not None:
+            self.continuum.temperature.set(time)
+        bodies = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("bodies.")}
+        self.bodies.restore({name: values.astype(float) for name, values in bodies.items()})
+        self.u.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
+        self.interfaces.move_fronts(self.u)
+        self.at = time
+        sums = (float(x) for x in arrays["sums"])
+        self.pairing.energy, self.largest_force, self.largest_energy, drift = sums
+        state = InterfaceState.from_arrays(arrays, len(self.pairs))
+        schur, offset, faces = (
+            arrays[f"dense.{name}"].astype(float) for name in ("schur", "offset", "faces")
+        )
+        self._resumed_dense = _Dense(state.index, schur, offset, faces, drift)
+        self._resume(state)
+
+    # -- energies and fields -------------------------------------------------------------
+
+    def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
+        """External work, energy out through bonds, mean jumps of the last trial."""
+        work = self._work_of(here, point)
+        return work.external_work(len(self.loads)), work.bonds, work.jump
+
+    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Add the energy friction dissipated in the last trial."""
+        self.friction_energy += self._work_of(here, point).friction
+
+    def _work_of(self, here: Equilibrium, point: Equilibrium) -> IncrementWork:
+        work = self._last if self._trial is None else self._trial.work
+        assert work is not None and work.start is here and work.end is point
+        return work
+
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies in the accepted state, by name; collective."""
+        if self._energies is None:
+            self._energies = self.bodies.stored()
+        return self._energies
+
+    def spent(self) -> dict[str, float]:
+        """Energies the bodies have turned into something else, by name; collective."""
+        spent = self.bodies.spent()
+        if self.interfaces.follow_sliding:
+            spent["pairing_energy"] = self.pairing.energy
+        return spent
+
+    def extra_work(self, state: Equilibrium) -> float:
+        """Work of loads that follow the bodies and of a temperature; collective."""
+        return self.bodies.work()
+
+    def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Accepted displacement; the caller destroys it."""
+        return self.u.copy()
+
+    def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Forces of interfaces and supports on the bodies; the caller destroys them."""
+        return self.tangent.out_of_balance((self.state if state is None else state).loads)
+
+    def destroy(self) -> None:
+        """Free all PETSc objects; collective."""
+        self._give_up()
+        self.pairing.forget()
+        self.tangent.destroy()
+
+
+__all__ = ["NewtonSolver"]

@@ -1,10 +1,10 @@
-"""A nonlinear continuum as its interfaces see it: SNES in the bodies, dense algebra between them.
+"""Equilibrium of nonlinear bodies: SNES in the bodies, dense algebra at their interfaces.
 
     T^t r(u) = (0, p)      r internal minus external forces, p forces of bonds and contact
 
 SNES works on y, the change of the jump coordinates since the last accepted state. Each of its
-steps condenses the tangent onto the window, finds jumps and forces of the interface there (bonds,
-contact, softening: the same code as for a linear continuum), and expands them. The residual it
+steps condenses the tangent onto the retained jumps, finds jumps and forces of the interface there
+(bonds, contact, softening: the same code as for linear bodies), and expands them. The residual it
 reduces is T^t r with the interface forces taken off where they are known.
 """
 
@@ -20,8 +20,10 @@ from petsc4py import PETSc
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import ConvergenceError, SolverError
 from fxcrack.condensation.mumps_schur import mumps_message
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.solvers.options import NewtonOptions
+from fxcrack.solvers.tangent import CondensedTangent
 
 _NEAR = 1e-3
 """Where the prediction is out of balance by more than this part of the forces, the tangent there is
@@ -30,11 +32,11 @@ _SLOW = 0.3
 """A tangent that leaves more of the residual than this is not used again."""
 _MANY = 2
 """Nor one that would need more steps than this: they cost as much as a new one or more."""
-_CRAWLS = 0.9
+_STALLED = 0.9
 """A shortened step that leaves more of the residual than this makes way for whole ones: in slender
 bodies they lead through larger residuals (of stretching) to the end (of bending)."""
-_ASTRAY = 10.0
-"""Whole steps have lost their way where the residual is this many times the one at their start or
+_DIVERGED = 10.0
+"""Whole steps have diverged where the residual is this many times the one at their start or
 after the first of them: the first may be the only one that knows of a new pressure or temperature.
 """
 
@@ -77,26 +79,47 @@ class InterfaceSnes:
     The callbacks are small so that each can be tested alone.
 
     Args:
-        model: The Newton model; owns bodies, condensation and dense system.
+        tangent: The bodies and their condensed tangent.
+        system: The dense system on the same retained jumps.
+        accepted: The last accepted equilibrium.
+        u: Its displacement, owned dofs.
         loads: Loads of the increment's end, shape (n_loads,).
         force: Given forces of its end, shape (n_retained,).
         guess: Interface forces at the initial guess, shape (n_retained,).
+        options: Controls of the iteration.
+        counts: Where solves and residuals are counted.
+        largest_force: Largest norm of the internal forces of an accepted state, force.
     """
 
-    def __init__(self, solver: Any, loads: Array, force: Array, guess: Array) -> None:
-        self.solver = solver
+    def __init__(
+        self,
+        tangent: CondensedTangent,
+        system: ContactSystem,
+        accepted: Equilibrium,
+        u: PETSc.Vec,
+        loads: Array,
+        force: Array,
+        guess: Array,
+        *,
+        options: NewtonOptions,
+        counts: Counts,
+        largest_force: float,
+    ) -> None:
+        self.tangent, self.system = tangent, system
+        self.accepted, self.u = accepted, u
+        self.options, self.counts = options, counts
         self.loads, self.force = loads, force
         self.known = guess
         """Interface forces that belong to the present iterate, shape (n_retained,)."""
         self.fraction = 1.0
         """Length of the last line-search step."""
-        self.solution: Any = None
+        self.solution: Equilibrium | None = None
         """Dense equilibrium of the last iteration."""
         self.values = np.zeros(0)
         """T^t r on the last rows at the last residual evaluated, shape (n_last,)."""
         self.scale = 0.0
-        nothing = np.finfo(float).eps * solver.largest_force
-        self.start = max(solver.force_scale, nothing), solver.round_off
+        nothing = np.finfo(float).eps * largest_force
+        self.start = max(tangent.force_scale, nothing), tangent.round_off
         """Forces in the bodies at the start, and what rounding leaves of them when they vanish."""
         self.error: Exception | None = None
         """What a callback raised; PETSc passes on an error code only."""
@@ -120,39 +143,58 @@ class InterfaceSnes:
 
     def _worn(self) -> bool:
         """Whether a new tangent comes cheaper than going on with the present one."""
-        if not self.solver.newton.reuse:
+        if not self.options.reuse:
             return True
         if self._steps_since == 0:
             return self.norms[-1] > _NEAR * self.scale
         rate = self.norms[-1] / self.norms[-2]
         if self.fraction != 1.0 or rate >= _SLOW:
             return True
-        if not self.solver.bodies.symmetric:
+        if not self.tangent.bodies.symmetric:
             return False  # S is that of the symmetric part: another one is no better
         return float(np.log(self.level / self.norms[-1])) < _MANY * float(np.log(rate))
 
     def residual(self, snes: Any, y: PETSc.Vec, out: PETSc.Vec) -> None:
         """T^t r(u) minus the interface forces that belong to y."""
-        solver = self.solver
-        forces = solver.forces_at(y, self.loads)
-        self.scale = solver.force_scale
-        transform = solver.coordinates.transform
-        transform.multTranspose(forces, out)
-        n_inner, n = solver.coordinates.n_inner, solver.system.n_retained
-        values = np.zeros(solver.coordinates.n_last)
-        if solver.comm.rank == 0:
+        tangent, system = self.tangent, self.system
+        coordinates, comm = tangent.coordinates, tangent.comm
+        forces = self._forces_at(y)
+        self.scale = tangent.force_scale
+        coordinates.transform.multTranspose(forces, out)
+        n_inner, n = coordinates.n_inner, system.n_retained
+        values = np.zeros(coordinates.n_last)
+        if comm.rank == 0:
             values[:] = out.array[n_inner:]
             out.array[n_inner:] = 0.0
-        solver.comm.Bcast(values)
+        comm.Bcast(values)
         self.values = values
         self._follow(y)
-        if solver.comm.rank == 0:
-            known = solver.system.knows_force()
+        if comm.rank == 0:
+            known = system.knows_force()
             wrong = np.where(known, values[:n] - self.known, 0.0)
             out.array[n_inner : n_inner + n] = wrong
         if self._residual is not None:
             self._residual.destroy()
         self._residual = forces
+
+    def _forces_at(self, y: PETSc.Vec) -> PETSc.Vec:
+        """R(u) minus dead loads at u = u_accepted + T y; the caller destroys it."""
+        transform = self.tangent.coordinates.transform
+        u = transform.createVecLeft()
+        transform.mult(y, u)
+        u.axpy(1.0, self.u)
+        self.tangent.bodies.set(u)
+        u.destroy()
+        return self.tangent.out_of_balance(self.loads)
+
+    def _jumps_of(self, y: PETSc.Vec) -> Array:
+        """Retained jumps at a trial y, shape (n_retained,); collective."""
+        out, comm = self.accepted.jump.copy(), self.tangent.comm
+        if comm.rank == 0:
+            n = self.tangent.coordinates.n_inner
+            out += y.array_r[n : n + len(out)]
+        comm.Bcast(out)
+        return out
 
     def _follow(self, y: PETSc.Vec) -> None:
         """Interface forces at a trial y: between those before and after the whole step."""
@@ -171,39 +213,74 @@ class InterfaceSnes:
 
     def step(self, y: PETSc.Vec, out: PETSc.Vec) -> None:
         """Newton step -dy (SNES subtracts it) from the condensed complementarity problem."""
-        solver = self.solver
+        tangent, system = self.tangent, self.system
         assert self._residual is not None
-        jump = solver.jumps_of(y)
-        if solver.linearise(jump, self.loads, self._residual, out, anew=self._worn()):
+        jump = self._jumps_of(y)
+        if self._linearise(jump, self._residual, out):
             self.renewed, self._steps_since = True, 0
             self.drift = self.norms[-1] / self.scale
         else:
             self._reused += 1
         self._steps_since += 1
         start = time.perf_counter()
-        self.solution = solver.interface_equilibrium(self.loads, self.force)
-        solver.timings.add("interface", start)
-        change = self.solution.jump - jump
-        last = np.zeros(solver.coordinates.n_last)
-        last[: solver.system.n_retained] = change
-        dq = solver.condensation.expanded(last)
+        self.solution = self._interface_equilibrium()
+        tangent.timings.add("interface", start)
+        last = np.zeros(tangent.coordinates.n_last)
+        last[: system.n_retained] = self.solution.jump - jump
+        dq = tangent.condensation.expanded(last)
         out.axpy(-1.0, dq)
         dq.destroy()
-        after = solver.system.forces(self.solution, np.arange(solver.system.n_retained))
+        after = system.forces(self.solution, np.arange(system.n_retained))
         if self._last is not None:
             self._last[0].destroy()
             self._last[1].destroy()
         self._last = (y.copy(), out.copy(), self.known.copy(), after)
+
+    def _linearise(self, jump: Array, residual: PETSc.Vec, out: PETSc.Vec) -> bool:
+        """Dense system of the tangent through the bodies' present forces.
+
+        Args:
+            jump: Jumps there, shape (n_retained,).
+            residual: Forces there, r.
+            out: Becomes A_11^-1 r_1.
+
+        Returns:
+            Whether a tangent of the bodies' present displacement was made; else the one at hand
+            serves, as its terms' data have not changed since.
+        """
+        bodies = self.tangent.bodies
+        anew = (self._worn() and not bodies.constant) or self.tangent.outdated
+        if anew:
+            self.tangent.factor()
+        q = self.tangent.anchor(self.system, residual, jump, self.loads)
+        q.copy(out)
+        q.destroy()
+        return anew
+
+    def _interface_equilibrium(self) -> Equilibrium:
+        """Jumps and forces on the present tangent, softening bonds on their right branches."""
+        system = self.system
+        state = system.equilibrium(self.loads, self.force)
+        for _ in range(4 * len(system.soft.bonds) + 4 if system.soft.bonds else 0):
+            if not system.soft.stable():
+                state = system.pass_unstable(state)
+                continue
+            at, leaving = system.soft.first_event(self.accepted.jump, state.jump)
+            if not np.isfinite(at):
+                break
+            system.finish([b for b in leaving if system.soft.switch(b, state.jump)])
+            state = system.equilibrium(self.loads, self.force)
+        return state
 
     def converged(self, snes: Any, its: int, norms: tuple[float, float, float]) -> int:
         """End when the residual is small beside the forces in the bodies, after a whole step."""
         norm = norms[2]
         if not np.isfinite(norm):
             return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-        self.solver.counts.residuals.append(norm)
+        self.counts.residuals.append(norm)
         forces, round_off = self.start
         level = max(
-            self.solver.newton.tolerance * max(self.scale, forces), self.solver.round_off, round_off
+            self.options.tolerance * max(self.scale, forces), self.tangent.round_off, round_off
         )
         self.norms.append(norm)
         self.level = level
@@ -211,13 +288,13 @@ class InterfaceSnes:
             self.drift = norm / self.scale if norm > level else 0.0
         if norm <= level and self.fraction == 1.0:
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
-        if its - self._reused >= self.solver.newton.max_iterations:
+        if its - self._reused >= self.options.max_iterations:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)
         if self.whole:
             if its <= 1:
-                self._limit = _ASTRAY * max(self.norms[0], norm)
+                self._limit = _DIVERGED * max(self.norms[0], norm)
             return int(PETSc.SNES.ConvergedReason.DIVERGED_DTOL) if norm > self._limit else 0
-        slow = its > 0 and self.fraction != 1.0 and norm > _CRAWLS * self.norms[-2]
+        slow = its > 0 and self.fraction != 1.0 and norm > _STALLED * self.norms[-2]
         if slow and not self.patient:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_LINE_SEARCH)
         return 0
@@ -339,7 +416,7 @@ def _drive(problem: InterfaceSnes, y: PETSc.Vec) -> tuple[int, int]:
     pc = ksp.getPC()
     pc.setType(PETSc.PC.Type.PYTHON)
     pc.setPythonContext(stepper)
-    snes.setTolerances(max_it=(_MANY + 2) * (problem.solver.newton.max_iterations + 1))
+    snes.setTolerances(max_it=(_MANY + 2) * (problem.options.max_iterations + 1))
     snes.setFromOptions()
     try:
         snes.solve(None, y)
@@ -360,4 +437,4 @@ def _drive(problem: InterfaceSnes, y: PETSc.Vec) -> tuple[int, int]:
         work.destroy()
 
 
-__all__ = ["ConvergenceError", "InterfaceSnes", "NewtonOptions", "SolverError", "solve"]
+__all__ = ["Counts", "InterfaceSnes", "solve"]

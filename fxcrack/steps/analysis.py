@@ -23,7 +23,7 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import History
 from fxcrack.interface.pairing import Pair
 from fxcrack.mesh import Mesh
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
@@ -66,16 +66,12 @@ class Snapshot:
 
     Attributes:
         balance: Time, increments and energies.
-        friction_energy: Energy that friction had taken, force times length.
         tip_values: What the criteria said at the tips.
-        state: The equilibrium.
-        solver: What the solver needs beyond it.
+        solver: State of interfaces and bodies, and the energy that friction had taken.
     """
 
     balance: EnergyBalance
-    friction_energy: float
     tip_values: list[TipValues]
-    state: Equilibrium
     solver: Any
 
 
@@ -100,7 +96,7 @@ class Analysis:
     """
 
     continuum: Continuum
-    solver: LinearSolver
+    solver: Solver
     debonds: Sequence[Debond]
     plan: Plan
     effects: Sequence[Any]
@@ -193,15 +189,10 @@ class Analysis:
         """Given forces of bonds on a ramp at a time, shape (n_retained,), force."""
         return given_forces(self.solver, self.ramps, time, self.balance.increment)
 
-    def set_ramps(self, ramps: Sequence[ForceRamp]) -> None:
-        """Prescribe these bond forces from now on; their nodes stay among the retained ones."""
-        self.ramps[:] = ramps
-        self.solver.keep = [(r.p, int(k)) for r in self.ramps for k in r.nodes]
-
     def add_ramp(self, ramp: ForceRamp) -> None:
         """Prescribe the forces of further bonds; ramps that have ended go."""
         still = still_pulling(self.ramps, self.time, self.balance.increment)
-        self.set_ramps([*still, ramp])
+        self.ramps = [*still, ramp]
 
     # -- cracks and tips -----------------------------------------------------------------
 
@@ -228,7 +219,6 @@ class Analysis:
         tips = [g.tips() for g in self.active]
         if not all(g.held(t) for g, t in zip(self.active, tips, strict=True)):
             self.solver.rebase()
-            self.solver.solve(self.given_force(self.time))
             for g, t in zip(self.active, tips, strict=True):
                 g.check_wake(t)
         self.tip_values = [
@@ -278,20 +268,12 @@ class Analysis:
 
     def snapshot(self) -> Snapshot:
         """What :meth:`rollback` needs to return to the present equilibrium."""
-        return Snapshot(
-            self.balance.copy(),
-            self.solver.friction_energy,
-            self.tip_values,
-            self.solver.state,
-            self.solver.remember(),
-        )
+        return Snapshot(self.balance.copy(), self.tip_values, self.solver.remember())
 
     def rollback(self, saved: Snapshot) -> None:
         """Return to an earlier equilibrium, with the same bonds."""
         self.balance = saved.balance.copy()
-        self.solver.friction_energy = saved.friction_energy
         self.tip_values = saved.tip_values
-        self.solver.state = saved.state
         self.solver.recall(saved.solver)
 
 

@@ -19,8 +19,8 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.crack_extent import CrackExtent
 from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.interface.tips import Tips
+from fxcrack.solvers.base import Solver
 from fxcrack.solvers.front_probe import CondensedFrontProbe
-from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.bond_records import ReleaseRecord, release_records
 from fxcrack.steps.debond import Debond, softens
 
@@ -46,7 +46,7 @@ class Crack:
         paths: Where tips come from.
     """
 
-    def __init__(self, solver: LinearSolver, p: int, debond: Debond) -> None:
+    def __init__(self, solver: Solver, p: int, debond: Debond) -> None:
         self.solver = solver
         self.p = p
         self.title = debond.interface.title
@@ -194,7 +194,7 @@ class Crack:
 
 
 def make_evaluator(
-    solver: LinearSolver, probe: FrontProbe, debond: Debond, criterion: Criterion, *, softens: bool
+    solver: Solver, probe: FrontProbe, debond: Debond, criterion: Criterion, *, softens: bool
 ) -> Evaluator:
     """The evaluator of a criterion on an interface; collective.
 

@@ -153,7 +153,7 @@ class _Cycling:
         ends = [loads for _, loads in self._corners[1:]]
         if len(ends) > 1 or system.friction is not None:
             ends.append(self._corners[0][1])
-        saved = system.snapshot()
+        saved = self._analysis.solver.interface_state()
         corners, largest = self._once(self._instant(self._analysis.solver.state), ends)
         if system.friction is not None:
             # slips settle over some cycles
@@ -168,7 +168,7 @@ class _Cycling:
         way = corners[:1]
         for a, b in pairwise(corners):
             way += self._between(a, b, largest, _HALVINGS)
-        system.restore(saved)
+        self._analysis.solver.restore_interfaces(saved)
         return self._extremes(way)
 
     def _once(self, start: _Instant, ends: list[Array]) -> tuple[list[_Instant], Array]:

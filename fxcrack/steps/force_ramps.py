@@ -12,7 +12,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.criteria import ReleaseLaw
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.friction_state import contact_share
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class PrescribedRamp:
 
     @classmethod
     def begin(
-        cls, solver: LinearSolver, p: int, nodes: Ints, law: ReleaseLaw, time: float
+        cls, solver: Solver, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> PrescribedRamp:
         """Note the bond forces of nodes that are about to be released."""
         return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
@@ -58,10 +58,10 @@ class PrescribedRamp:
         """Increment suggested for the first one after debonding, time."""
         return self.law.suggested_increment
 
-    def accept(self, time: float, solver: LinearSolver) -> None:
+    def accept(self, time: float, solver: Solver) -> None:
         """Nothing: the fraction depends on what has passed since debonding alone."""
 
-    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+    def viscous_part(self, spent: float, solver: Solver, here: Array, there: Array) -> float:
         """Part of the energy spent between two states that viscosity took: none."""
         return 0.0
 
@@ -101,11 +101,11 @@ class ViscousRamp:
         """Remaining fraction at the end of an increment."""
         return self.remaining * self.viscosity / (self.viscosity + max(now - self.time, 0.0))
 
-    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+    def viscous_part(self, spent: float, solver: Solver, here: Array, there: Array) -> float:
         """Part of the energy spent between two states that viscosity took: all of it."""
         return spent
 
-    def accept(self, time: float, solver: LinearSolver) -> None:
+    def accept(self, time: float, solver: Solver) -> None:
         """Go on from the end of an accepted increment."""
         self.remaining, self.time = self.fraction(time), time
 
@@ -155,7 +155,7 @@ class ViscousCohesiveRamp:
     @classmethod
     def begin(
         cls,
-        solver: LinearSolver,
+        solver: Solver,
         p: int,
         units: Sequence[CohesiveUnit],
         viscosity: float,
@@ -185,7 +185,7 @@ class ViscousCohesiveRamp:
         dt = max(now - self.time, 0.0)
         return (dt * self.damage + self.viscosity * self.lagging) / (dt + self.viscosity)
 
-    def damage_at(self, solver: LinearSolver, jump: Array) -> Array:
+    def damage_at(self, solver: Solver, jump: Array) -> Array:
         """D of a state, shape (n_laws,): of the largest opening along the force at debonding."""
         index = solver.index[self.p][self.nodes]
         at = np.where(index >= 0, jump[np.maximum(index, 0)], 0.0)
@@ -193,13 +193,13 @@ class ViscousCohesiveRamp:
         opening = -work / _sizes(self.force, self.unit)
         return np.asarray(np.maximum(self.damage, np.clip(opening / self.final, 0.0, 1.0)))
 
-    def fracture_energy(self, solver: LinearSolver, jump: Array) -> float:
+    def fracture_energy(self, solver: Solver, jump: Array) -> float:
         """What the law without viscosity has spent up to a state, force times length."""
         left = 1.0 - self.damage_at(solver, jump)
         whole = 0.5 * _sizes(self.force, self.unit) * self.final
         return float(whole @ (1.0 - left**2))
 
-    def viscous_part(self, spent: float, solver: LinearSolver, here: Array, there: Array) -> float:
+    def viscous_part(self, spent: float, solver: Solver, here: Array, there: Array) -> float:
         """Part of the energy spent between two states that viscosity took.
 
         It is what the law without viscosity would not have spent.
@@ -213,7 +213,7 @@ class ViscousCohesiveRamp:
         law = [self.fracture_energy(solver, jump) for jump in (here, there)]
         return spent - (law[1] - law[0])
 
-    def accept(self, time: float, solver: LinearSolver) -> None:
+    def accept(self, time: float, solver: Solver) -> None:
         """Go on from the end of an accepted increment."""
         self.lagging = self._lagging_at(time)
         self.damage, self.time = self.damage_at(solver, solver.state.jump), time
@@ -245,7 +245,7 @@ def still_pulling(ramps: Sequence[ForceRamp], time: float, increment: int) -> li
     return [r for r in ramps if np.any(np.abs(r.fraction(r.now(time, increment))) > _SPENT)]
 
 
-def bond_forces_of(solver: LinearSolver, p: int, nodes: Ints) -> Array:
+def bond_forces_of(solver: Solver, p: int, nodes: Ints) -> Array:
     """Forces on the slave side of bonded nodes in jump components, shape (n, gdim).
 
     With friction, less the part that contact carries at once.
@@ -261,9 +261,7 @@ def bond_forces_of(solver: LinearSolver, p: int, nodes: Ints) -> Array:
     return force
 
 
-def given_forces(
-    solver: LinearSolver, ramps: Sequence[ForceRamp], time: float, increment: int
-) -> Array:
+def given_forces(solver: Solver, ramps: Sequence[ForceRamp], time: float, increment: int) -> Array:
     """Forces that remain at a time and an increment, shape (n_retained,)."""
     force = np.zeros(solver.system.n_retained)
     for ramp in ramps:

@@ -81,14 +81,13 @@ class NewtonLoadPath:
             if beyond is not None:
                 guess = self._secant(beyond, guess)
                 guess = begin + min(max(guess - begin, -size), size)
-            saved = self._solver.system.snapshot()
             try:
                 point, values = self._try(guess, strict=strict)
                 level = largest(values)
                 off = level - 1.0 if upward else 1.0 - level
                 crossed = off > _AT_ONE and abs(guess - begin) > _SMALLEST * _AT_ONE * whole
                 if crossed and not self._reversible:
-                    self._solver.revert(saved)
+                    self._solver.revert()
                     beyond = (guess, level)
                     continue
                 if not self._solver.exact:
@@ -127,9 +126,10 @@ class NewtonLoadPath:
     @property
     def _reversible(self) -> bool:
         """Whether the way back passes through the same equilibria: nothing depends on the path."""
-        system, bodies = self._solver.system, self._solver.bodies
-        dependent = bodies.path_dependent or system.soft.bonds or self._analysis.ramps
-        return not (dependent or system.friction is not None or self._solver.follows_sliding)
+        solver = self._solver
+        dependent = solver.bodies.path_dependent or solver.system.soft.bonds or self._analysis.ramps
+        slides = solver.system.friction is not None or solver.interfaces.follow_sliding
+        return not (dependent or slides)
 
     def _try(self, at: float, *, strict: bool = False) -> tuple[Equilibrium, list[TipValues]]:
         """The equilibrium at a time, a trial, and the criteria there."""
@@ -207,15 +207,9 @@ class NewtonLoadPath:
 
     def _zero(self, excess: Callable[[Equilibrium], float], value: float, target: float) -> float:
         """Time on the way to a target where the tangent has a quantity at zero, or the target."""
-        system = self._solver.system
-        saved = system.snapshot()
+        saved = self._solver.interface_state()
         begin, done, found = self._analysis.time, 0.0, target
-        state, loads, force = (
-            self._solver.state,
-            self._analysis.loads_at(target),
-            self._analysis.given_force(target),
-        )
-        for fraction, point in system.pieces(state, loads, force):
+        for fraction, point in self._predictions(target):
             after = excess(point)
             if value * after <= 0.0:
                 found = begin + (target - begin) * (
@@ -223,13 +217,12 @@ class NewtonLoadPath:
                 )
                 break
             done, value = fraction, after
-        system.restore(saved)
+        self._solver.restore_interfaces(saved)
         return found
 
     def _predicted(self, target: float, *, upward: bool) -> float:
         """Time before a target at which f reaches 1 on the tangent; the target if it does not."""
-        system = self._solver.system
-        saved = system.snapshot()
+        saved = self._solver.interface_state()
         here, begin, done, found = self._solver.state, self._analysis.time, 0.0, target
         for fraction, point in self._predictions(target):
             a, b = (begin + x * (target - begin) for x in (done, fraction))
@@ -241,7 +234,7 @@ class NewtonLoadPath:
                 found = a + hit * (b - a)
                 break
             here, done = point, fraction
-        system.restore(saved)
+        self._solver.restore_interfaces(saved)
         return found
 
     def _secant(self, beyond: tuple[float, float], predicted: float) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.driver import BEYOND, LARGE, StepDriver
@@ -270,7 +270,7 @@ class OpeningControl:
         InputError: No monitor has that name, faces have friction, or bonds are cohesive.
     """
 
-    def __init__(self, solver: LinearSolver, cracks: Sequence[Crack], names: Sequence[str]) -> None:
+    def __init__(self, solver: Solver, cracks: Sequence[Crack], names: Sequence[str]) -> None:
         self._solver = solver
         self.name = " - ".join(names)
         self.opening = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fxcrack.history import Row
-from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
 
 Observer = Callable[[str, Row], None]
@@ -44,7 +44,7 @@ class Recorder:
             self._observer(event, row)
 
 
-def load_columns(solver: LinearSolver) -> list[tuple[str, str, bool]]:
+def load_columns(solver: Solver) -> list[tuple[str, str, bool]]:
     """Columns of each support component and force pattern, in the order of ``state.loads``.
 
     Returns:

@@ -45,7 +45,7 @@ def potentials(load: float) -> tuple[Array, Array]:
     mesh = arms(length=SHORT)
     scene = specimen(mesh, a0=A0, supports=FAR, loads=FORCES)
     scene.run(fx.Static(until=fx.Time(1e-9)), progress=False)
-    k = gathered(scene.solver._stiffness)
+    k = gathered(scene.solver.stiffness)
     pair = scene.pairs[0]
     x = scene.continuum.positions()
     n = k.shape[0]

@@ -92,7 +92,7 @@ def assert_in_balance(scene: fx.Scene) -> None:
     gdim = scene.mesh.gdim
     residual = gathered_vector(vector).reshape(-1, gdim)
     which = np.concatenate(scene.mesh.comm.allgather(scene.supports.which)).reshape(-1, gdim)
-    stiffness = abs(gathered(model._stiffness))
+    stiffness = abs(gathered(model.stiffness))
     slack = FORCE * float((stiffness @ np.abs(gathered_vector(u))).max())
     u.destroy()
     vector.destroy()

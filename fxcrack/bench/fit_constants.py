@@ -28,8 +28,8 @@ def fit_law(n: list[float], y: list[float], exponent: float, log: float, linear:
     }  # fmt: skip
 
 
-def constants(result: Result) -> Result:
-    """What :class:`fxcrack.bench.cost.Constants` reads, from :func:`fxcrack.bench.scale.run`.
+def fit_constants(result: Result) -> Result:
+    """What ``Constants.read`` expects, from a result of :func:`fxcrack.bench.scale.run`.
 
     Raises:
         InputError: Cases that are needed were not measured.

@@ -1,28 +1,106 @@
-"""Scale results and cost estimates as tables for a terminal."""
+"""Results of benchmarks and estimates of cost as tables for a terminal."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from rich import box
-from rich.console import Console
+from rich.console import Console, Group
 from rich.table import Table
 
-from fxcrack.bench.cost import Constants, Estimate, Task
+from fxcrack.base.terminal import new_table
+from fxcrack.bench.cost import CostEstimate, Task
+from fxcrack.condensation.cost_laws import Constants
 
 Result = dict[str, Any]
 
+_PHASES = {
+    "scene": "spaces, pairing, supports",
+    "assemble": "assemble K",
+    "transform": "T and T^t K T",
+    "factor_with_schur": "factorisation with S",
+    "march": "crack growth on S",
+    "total": "total, mesh to last onset",
+    "plain_factor": "plain factorisation",
+    "plain_factor_same_order": "plain factorisation, ordered as with S",
+    "one_solve": "one back-solve",
+}
 
-def _table(title: str, *columns: str) -> Table:
-    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
-    for i, column in enumerate(columns):
-        table.add_column(column, justify="left" if i == 0 else "right")
+
+def show_speed(result: Result, console: Console) -> None:
+    """Print a result of :func:`fxcrack.bench.speed.run`."""
+    console.print(Group(_summary(result), _seconds(result), _curve(result)))
+    if "beam_theory" in result:
+        console.print(_beam_theory(result["beam_theory"]))
+    if "baselines" in result:
+        console.print(_baselines(result))
+
+
+def _summary(result: Result) -> Table:
+    size = ", ".join(f"{k} {result[k]:g}" for k in ("dx", "dy", "ny") if k in result)
+    table = new_table(f"{result['problem']} ({size})", "", "")
+    table.show_header = False
+    for key in ("dofs", "window", "releases", "events", "factorizations", "ranks", "threads"):
+        table.add_row(key, str(result[key]))
+    table.add_row("total / one static solve", f"{result['ratio_to_one_solve']:.2f}")
+    same = result["ratio_to_one_solve_same_order"]
+    table.add_row("the same, ordered as with S", f"{same:.2f}")
+    plain = result["peak_memory_plain_mb"]
+    beside = "" if plain is None else f" ({result['peak_memory_mb'] / plain:.2f} x plain)"
+    table.add_row("peak memory, MB", f"{result['peak_memory_mb']:.0f}{beside}")
+    deviation = result.get("largest_deviation_from_reference")
+    if deviation is not None:
+        table.add_row("off the reference by", f"{deviation:.2g}")
     return table
 
 
-def show(result: Result, console: Console) -> None:
+def _seconds(result: Result) -> Table:
+    table = new_table("seconds", "phase", "s")
+    for phase, seconds in result["seconds"].items():
+        table.add_row(_PHASES[phase], f"{seconds:.3f}")
+    table.add_row("compilation of forms (apart)", f"{result['compile']:.3f}")
+    return table
+
+
+def _curve(result: Result) -> Table:
+    table = new_table("onset", "a", "opening", "load")
+    for point in result["curve"]:
+        table.add_row(f"{point['a']:g}", f"{point['opening']:.4f}", f"{point['load']:.4f}")
+    return table
+
+
+def _beam_theory(beside: Result) -> Table:
+    low, high = beside["between"]
+    table = new_table(
+        f"beside corrected beam theory; mean ratio {beside['mean_load_ratio']:.3f} "
+        f"while a = {low:g} to {high:g}",
+        *("mean a", "opening", "load", "theory", "ratio"),
+    )
+    for point in beside["curve"]:
+        a, opening, load, theory = (point[k] for k in ("a", "opening", "load", "beam_load"))
+        table.add_row(
+            f"{a:.2f}", f"{opening:.3f}", f"{load:.2f}", f"{theory:.2f}", f"{load / theory:.3f}"
+        )
+    return table
+
+
+def _baselines(result: Result) -> Table:
+    table = new_table("baselines", "", "s", "measured", "of", "differs by", "speed-up")
+    for name, unit in (("refactor", "releases"), ("columns", "columns")):
+        found = result["baselines"][name]
+        table.add_row(
+            f"{name}{' (scaled)' if found['scaled'] else ''}",
+            f"{found['seconds']:.1f}",
+            str(found[f"measured_{unit}"]),
+            f"{found[f'all_{unit}']} {unit}",
+            f"{found['largest_difference']:.1e}",
+            f"{result[f'speedup_over_{name}']:.1f}",
+        )
+    return table
+
+
+def show_scale(result: Result, console: Console) -> None:
     """Print a result of :func:`fxcrack.bench.scale.run`."""
-    table = _table(
+    table = new_table(
         f"direct and iterative, {result['date']}, {result['machine']}",
         *("shape", "dofs", "method", "ranks", "window", "condense s", "per column ms"),
         *("iterations", "total s", "memory MB", "kB/dof"),
@@ -58,7 +136,7 @@ def show(result: Result, console: Console) -> None:
 
 def _strong(cases: list[Result]) -> Table:
     """One rank against several, phase by phase."""
-    table = _table(
+    table = new_table(
         "time on 1 rank over that on P", "case", "P", "phase", "1 rank s", "P s", "ratio"
     )
     done = [c for c in cases if "failed" not in c]
@@ -79,7 +157,7 @@ def _strong(cases: list[Result]) -> Table:
 
 
 def show_cost(
-    found: list[tuple[Task, list[Estimate]]], constants: Constants, console: Console
+    found: list[tuple[Task, list[CostEstimate]]], constants: Constants, console: Console
 ) -> None:
     """Print estimates, the best method of each task first."""
     console.print(f"constants measured {constants.date} on {constants.machine}")
@@ -92,7 +170,7 @@ def show_cost(
                 f"{title}: no method fits the memory; more ranks, or more memory per rank"
             )
             continue
-        table = _table(title, "", *(f"{e.method}, {e.ranks} ranks" for e in estimates))
+        table = new_table(title, "", *(f"{e.method}, {e.ranks} ranks" for e in estimates))
         for kind, unit in (("seconds", "s"), ("memory", "GB")):
             names = list(dict.fromkeys(k for e in estimates for k in getattr(e, kind)))
             for name in names:

@@ -26,7 +26,7 @@ _FIRST = 0.5
 
 
 @dataclass(frozen=True)
-class Power:
+class PowerLaw:
     """y = factor x^exponent."""
 
     factor: float
@@ -37,7 +37,7 @@ class Power:
         return np.asarray(self.factor * np.asarray(x, dtype=float) ** self.exponent)
 
 
-def fit_power(x: npt.ArrayLike, y: npt.ArrayLike) -> Power | None:
+def fit_power(x: npt.ArrayLike, y: npt.ArrayLike) -> PowerLaw | None:
     """Fit a power to positive points; ``None`` for fewer than two different x."""
     a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     good = (a > 0.0) & (b > 0.0) & np.isfinite(a) & np.isfinite(b)
@@ -46,7 +46,7 @@ def fit_power(x: npt.ArrayLike, y: npt.ArrayLike) -> Power | None:
         return None
     mean = a.mean()
     slope = float((a - mean) @ b / ((a - mean) @ (a - mean)))
-    return Power(float(np.exp(b.mean() - slope * mean)), slope)
+    return PowerLaw(float(np.exp(b.mean() - slope * mean)), slope)
 
 
 def unknowns(setting: Setting) -> float:

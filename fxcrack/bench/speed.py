@@ -17,15 +17,9 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fxcrack.base.parallel import slowest
 from fxcrack.bench.baselines import Columns, Follower, Matrices, Onset, Refactor
-from fxcrack.bench.measure import (
-    Growth,
-    TimedHistory,
-    grow,
-    memory_of_one_solve,
-    slowest,
-    solve_once,
-)
+from fxcrack.bench.measure import Growth, TimedHistory, grow, memory_of_one_solve, solve_once
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.mesh import Mesh
 from fxcrack.scene import Scene

@@ -10,21 +10,26 @@ import os
 import platform
 import time
 from collections.abc import Callable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from typing import Any
 
+import fxcrack  # isort: skip  (orders MPI before DOLFINx)
+import dolfinx
 import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
 
-import fxcrack
 from fxcrack.accuracy.family import settings
-from fxcrack.accuracy.fit import FIT_POINTS, FIT_RANGE, fit_power, plan, predict
 from fxcrack.accuracy.launch import START_LIMIT, SettingFailed, TookTooLong, Workers
 from fxcrack.accuracy.load import load
 from fxcrack.accuracy.pareto import TARGETS, advice, cheapest, pareto_front
-from fxcrack.accuracy.reference import MAIN, Reference, reference, worst
+from fxcrack.accuracy.prediction import FIT_POINTS, FIT_RANGE, fit_power, plan, predict
+from fxcrack.accuracy.reference import Reference, reference, worst
 from fxcrack.accuracy.study import Setting, Study
 from fxcrack.accuracy.worker import REPEATS, SHORT
 from fxcrack.base.errors import InputError
+from fxcrack.base.machine import cores, processor
 
 Result = dict[str, Any]
 Tell = Callable[[str], None]
@@ -35,7 +40,7 @@ _NEAR = 0.5  # seconds to the end of the budget that are not worth starting for
 _AT_LEAST = 10.0  # or so many seconds, but not more than the budget has left
 
 
-def run(
+def run_study(
     scene: str,
     *,
     budget: float = 60.0,
@@ -62,7 +67,7 @@ def run(
         study = replace(study, sizes=tuple(sizes))
     waiting = settings(study)
     session = _Session(scene, waiting, budget, tell)
-    session.march()
+    session.run()
     records, failed, done = session.records, session.failed, session.done
     waiting = session.waiting
     left_out = [
@@ -103,9 +108,9 @@ class _Session:
         """Seconds since the beginning."""
         return time.monotonic() - self._begin
 
-    def march(self) -> None:
+    def run(self) -> None:
         """Run what fits."""
-        with Workers(self._scene, warm=min(self.waiting, key=_cheapness)) as workers:
+        with closing(Workers(self._scene, min(self.waiting, key=_cheapness))) as workers:
 
             def extra(setting: Setting, seconds: float) -> float:
                 start = 0.0 if workers.started(setting.ranks) else self._start
@@ -161,7 +166,7 @@ def assemble(study: Study, records: list[tuple[Setting, Result]], measure: str) 
     Args:
         study: The study.
         records: Settings and what their worker answered.
-        measure: As for :func:`run`.
+        measure: As for :func:`run_study`.
 
     Raises:
         InputError: Nobody measured the quantity asked for.
@@ -282,11 +287,6 @@ def _exponents(records: list[tuple[Setting, Result]]) -> dict[str, dict[str, Any
 
 def machine() -> Result:
     """Where and with what it was measured."""
-    import dolfinx
-    from mpi4py import MPI
-    from petsc4py import PETSc
-
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "fxcrack": fxcrack.__version__,
         "python": platform.python_version(),
@@ -295,21 +295,8 @@ def machine() -> Result:
         "mpi": " ".join(MPI.Get_library_version().replace("\0", "").split()[:3]),
         "numpy": np.__version__,
         "system": f"{platform.system()} {platform.machine()}",
-        "processor": _processor(),
-        "cores": cores,
+        "processor": processor(),
+        "cores": cores(),
         "threads": os.environ.get("OMP_NUM_THREADS", "1"),
         "date": time.strftime("%Y-%m-%d"),
     }
-
-
-def _processor() -> str:
-    """Name of the processor where the system tells it."""
-    try:
-        with open("/proc/cpuinfo", encoding="utf-8") as stream:
-            lines = [line.partition(":") for line in stream]
-    except OSError:
-        return platform.processor()
-    return next((v.strip() for k, _, v in lines if k.strip() == "model name"), platform.machine())
-
-
-__all__ = ["MAIN", "assemble", "machine", "run"]

@@ -1,0 +1,166 @@
+"""Interfaces of bodies that move: jumps in a displacement, fronts and pairs that follow it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.interface.finite_sliding import CHANGING, changing, renewed, with_changing
+from fxcrack.interface.front import Front
+from fxcrack.interface.jump_coordinates import JumpCoordinates
+from fxcrack.interface.nodes import JumpGather
+from fxcrack.interface.pairing import Pair
+from fxcrack.interface.surface import gather_surface
+from fxcrack.solvers.increment_work import IncrementWork
+
+
+class DeformedInterfaces:
+    """The interfaces as a displacement of the bodies has them.
+
+    Args:
+        continuum: Displacement space.
+        pairs: Interfaces; replaced in this list where nodes are paired anew.
+        fronts: Their fronts.
+        finite: Whether the bodies turn and stretch by any amount, so that fronts and pairs follow.
+    """
+
+    def __init__(
+        self, continuum: Continuum, pairs: list[Pair], fronts: list[Front], *, finite: bool
+    ) -> None:
+        self._pairs, self._fronts, self._finite = pairs, fronts, finite
+        self._gdim = continuum.gdim
+        # undeformed master surfaces of those whose pairing is renewed
+        self._masters = [
+            gather_surface(continuum, p.interface.master)
+            if finite and p.interface.contact
+            else None
+            for p in pairs
+        ]
+        self._undeformed = [p.surface.x for p in pairs]
+        known = [m for m in self._masters if m is not None]
+        self._reader = JumpGather(continuum.layout, pairs, known)
+
+    @property
+    def follow_sliding(self) -> bool:
+        """Whether open nodes are paired anew where faces slide."""
+        return any(m is not None for m in self._masters)
+
+    def jumps(self, u: PETSc.Vec, coordinates: JumpCoordinates) -> Array:
+        """Retained jumps in a displacement, shape (n_retained,); collective."""
+        values = self._reader.gather(u.array_r)
+        out = np.zeros(coordinates.n_retained)
+        for pair, frames, index in zip(
+            self._pairs, coordinates.frames, coordinates.index, strict=True
+        ):
+            inside = index >= 0
+            out[index[inside]] = self._reader.jumps(values, pair, frames)[inside]
+        return out
+
+    def move_fronts(self, u: PETSc.Vec) -> None:
+        """Take normals and lengths at the fronts from a displacement; collective."""
+        if not self._finite:
+            return
+        values = self._reader.gather(u.array_r)
+        for pair, front, x in zip(self._pairs, self._fronts, self._undeformed, strict=True):
+            moved = x.copy()
+            moved[:, : self._gdim] += self._reader.displacements(values, pair.surface)
+            front.follow(moved)
+
+    def pair_anew(self, u: PETSc.Vec) -> bool:
+        """Pair open nodes with the master surface where it is now; whether any changed.
+
+        Collective.
+        """
+        if not self.follow_sliding:
+            return False
+        values = self._reader.gather(u.array_r)
+        changed = False
+        for p, master in enumerate(self._masters):
+            if master is None:
+                continue
+            pair = self._pairs[p]
+            new = renewed(
+                pair,
+                self._fronts[p].bonded,
+                master,
+                self._reader.displacements(values, pair.surface),
+                self._reader.displacements(values, master),
+            )
+            if new is not None:
+                self._pairs[p], changed = new, True
+        return changed
+
+    def pairing(self) -> list[dict[str, npt.NDArray[Any]]]:
+        """What renewed pairings have changed, per pair; the same on any number of ranks."""
+        return [
+            {} if master is None else changing(pair, master)
+            for pair, master in zip(self._pairs, self._masters, strict=True)
+        ]
+
+    def restore_pairing(self, arrays: Mapping[str, npt.NDArray[Any]], key: str) -> None:
+        """Take over pairings from :meth:`pairing`.
+
+        Args:
+            arrays: Its values by ``key.format(name, p)``.
+            key: Format of their names.
+        """
+        for p, master in enumerate(self._masters):
+            if master is not None:
+                known = {name: arrays[key.format(name, p)] for name in CHANGING}
+                self._pairs[p] = with_changing(self._pairs[p], master, known)
+
+
+class PairingEnergy:
+    """Energy taken by new pairings of faces that slide.
+
+    Contact forces move to other master points, and gaps that are not zero there close: on the way
+    to the next equilibrium the interfaces do work, of which friction and bonds explain a part. The
+    rest is this energy.
+
+    Attributes:
+        energy: What it is so far.
+    """
+
+    def __init__(self) -> None:
+        self.energy = 0.0
+        self._before: PETSc.Vec | None = None
+
+    @property
+    def pending(self) -> bool:
+        """Whether there is a new pairing whose equilibrium has not been accepted yet."""
+        return self._before is not None
+
+    def begin(self, forces: PETSc.Vec) -> None:
+        """Keep the forces of interfaces and supports before a new pairing, owned from now on."""
+        self.forget()
+        self._before = forces
+
+    def book(self, forces: PETSc.Vec, step: PETSc.Vec, work: IncrementWork, n_forces: int) -> None:
+        """Add the energy of the pairing, by the trapezoidal rule; collective.
+
+        Args:
+            forces: Forces of interfaces and supports after it; destroyed.
+            step: Change of the displacement.
+            work: Work along the increment.
+            n_forces: Number of force patterns.
+        """
+        forces.axpy(1.0, self._before)
+        given = 0.5 * float(forces.dot(step)) - work.support_work(n_forces)
+        self.energy -= given + work.bonds + work.friction
+        forces.destroy()
+        self.forget()
+
+    def forget(self) -> None:
+        """Give up a pairing whose equilibrium is not wanted."""
+        if self._before is not None:
+            self._before.destroy()
+            self._before = None
+
+
+__all__ = ["DeformedInterfaces", "PairingEnergy"]

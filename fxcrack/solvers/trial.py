@@ -1,0 +1,167 @@
+"""Trial increments of nonlinear bodies: predicted on the tangent, corrected by SNES, integrated."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
+from fxcrack.equilibrium.friction_state import FrictionWork
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.solvers import snes
+from fxcrack.solvers.increment_work import TrialIncrement
+from fxcrack.solvers.options import NewtonOptions
+from fxcrack.solvers.tangent import CondensedTangent
+
+_FAR_OFF = 1e-5
+"""A tangent made where more than this part of the forces was out of balance gives way to that of
+the state itself when one is accepted."""
+_NOISE = 10.0
+"""Energies of an increment may be off by so many times the residual left times the step."""
+
+
+class IncrementSolver:
+    """Finds equilibria at other loads, and the work along the increments that lead there.
+
+    Args:
+        tangent: The bodies and their condensed tangent.
+        options: Controls of the iteration.
+        n_loads: Number of supports and force patterns together.
+        n_forces: How many of these are force patterns (the last ones).
+
+    Attributes:
+        counts: Solves and iterations so far.
+    """
+
+    def __init__(
+        self, tangent: CondensedTangent, options: NewtonOptions, n_loads: int, n_forces: int
+    ) -> None:
+        self._tangent, self._options = tangent, options
+        self._n_loads, self._n_forces = n_loads, n_forces
+        self.counts = snes.Counts()
+
+    def find(
+        self,
+        system: ContactSystem,
+        here: Equilibrium,
+        u: PETSc.Vec,
+        loads: Array,
+        force: Array,
+        at: float,
+        *,
+        follow: bool,
+        largest_force: float,
+    ) -> TrialIncrement:
+        """Find the equilibrium at other loads and given forces; collective.
+
+        The dense system passes through it on the tangent at hand, its contact and softening states
+        are those of the trial.
+
+        Args:
+            system: The dense system, in the accepted state.
+            here: The accepted equilibrium.
+            u: Its displacement, owned dofs.
+            loads: Shape (n_loads,).
+            force: Shape (n_retained,).
+            at: Time of the end.
+            follow: Follow contact and softening on the path; else go straight to the end.
+            largest_force: Largest norm of the internal forces of an accepted state, force.
+
+        Raises:
+            ConvergenceError: None was found.
+        """
+        tangent, n = self._tangent, system.n_retained
+        start = time.perf_counter()
+        points = [(0.0, here)]
+        if follow:
+            points += system.pieces(here, loads, force)
+        else:
+            points.append((1.0, system.equilibrium(loads, force)))
+        predicted = points[-1][1]
+        rate = system.rates(loads - here.loads, force - here.force)
+        sliding = None if system.friction is None else FrictionWork.of(system, points)
+        tangent.timings.add("interface", start)
+        soft = system.soft.components
+        last = np.zeros(tangent.coordinates.n_last)
+        last[:n] = predicted.jump - here.jump
+        last[n : n + self._n_loads] = predicted.loads - here.loads
+        y = tangent.condensation.expanded(last)
+        problem = snes.InterfaceSnes(
+            tangent, system, here, u, loads, force, system.forces(predicted, np.arange(n)),
+            options=self._options, counts=self.counts, largest_force=largest_force,
+        )  # fmt: skip
+        self.counts.residuals = []
+        try:
+            iterations = snes.solve(problem, y)
+            end, values = self._end(system, problem, predicted, loads)
+            to = tangent.coordinates.transform.createVecLeft()
+            tangent.coordinates.transform.mult(y, to)
+        finally:
+            problem.destroy()
+            y.destroy()
+        # forces are known to what the iteration leaves out of balance, and so is their work
+        noise = _NOISE * problem.level * float(to.norm())
+        to.axpy(1.0, u)
+        self.counts.solves += 1
+        self.counts.iterations += iterations
+        drift = problem.drift + (0.0 if problem.renewed else tangent.drift)
+        friction = 0.0 if sliding is None else sliding.energy(system, end)
+        return TrialIncrement(
+            points, end, rate, soft, iterations, friction, at, to, values, drift, noise
+        )
+
+    def _end(
+        self,
+        system: ContactSystem,
+        problem: snes.InterfaceSnes,
+        predicted: Equilibrium,
+        loads: Array,
+    ) -> tuple[Equilibrium, Array]:
+        """The equilibrium SNES has found, with the dense system through it, and the values there.
+
+        See :class:`TrialIncrement`.
+        """
+        last = predicted if problem.solution is None else problem.solution
+        begin = system.n_retained
+        end = begin + self._n_loads - self._n_forces
+        borders = self._tangent.border_values()
+        answers = np.concatenate([problem.values[begin:end], -borders[: self._n_forces]])
+        state = Equilibrium(loads, last.force, last.jump, answers)
+        values = np.concatenate([problem.values[:end], borders])
+        self._tangent.pass_through(system, values, state.jump, loads)
+        return state, values
+
+    def integrate(self, trial: TrialIncrement, system: ContactSystem, *, exact: bool) -> None:
+        """Have the tangent of the trial where it counts, and the work along the increment.
+
+        Collective.
+
+        Args:
+            trial: From :meth:`find`.
+            system: The dense system it has left.
+            exact: Whether the tangent must be that of the trial to the last digit.
+
+        Raises:
+            NotPositiveDefinite: The equilibrium is unstable.
+        """
+        tangent, bodies = self._tangent, self._tangent.bodies
+        here, end = trial.points[0][1], trial.end
+        trapezoidal = bodies.dynamic or bodies.path_dependent
+        limit = 0.0 if exact else np.inf if trapezoidal else _FAR_OFF
+        if trial.iterations and trial.drift > limit and not bodies.constant:
+            tangent.factor()
+            tangent.pass_through(system, trial.values, end.jump, end.loads)
+            trial.drift = 0.0
+        if tangent.renewed and tangent.condensation.n_negative:
+            raise NotPositiveDefinite(0)
+        after = trial.rate
+        if trial.iterations and not trapezoidal:
+            after = system.rates(end.loads - here.loads, end.force - here.force)
+        soft = system.soft.components
+        trial.work = trial.integrals(after, soft, trapezoidal=trapezoidal)
+
+
+__all__ = ["IncrementSolver"]

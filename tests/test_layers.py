@@ -1,0 +1,172 @@
+"""The design that the source must keep: layers, flat inheritance, no citation that leads nowhere.
+
+A folder or a module at the top level imports from those before it in :data:`ORDER` only. Imports
+for the type checker count as well. The rules are read from the source; nothing is imported.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parent.parent
+FOLDERS = ("fxcrack", "meshes", "demos", "tests")
+ORDER = (
+    *("base", "mesh", "meshes", "continuum", "interface", "condensation", "equilibrium"),
+    *("solvers", "criteria", "history", "steps", "restart", "output"),
+    *("effects", "error_estimate", "beam_theory", "scene"),
+    *("public names", "demos", "accuracy", "bench", "cli"),
+)
+"""From the bottom up; "public names" is ``fxcrack/__init__.py``."""
+
+ON_USE = {
+    "mesh.read -> gmsh": "only a gmsh model or file needs it, and it loads a large library",
+    "history -> output.plots": "matplotlib is loaded by those who plot; the one arrow upwards",
+    "accuracy.scenes -> demos": "a study loads its own demo alone; one of them loads matplotlib",
+    "cli": "its help does not wait for the libraries of its commands",
+}
+"""Imports inside functions, or beginnings of such arrows, with the reason."""
+
+LEVELS = 2
+"""Classes of this package above a class; exceptions may have more, as handlers read them."""
+
+KNOWN: dict[str, list[str]] = {
+    "upwards": [
+        "error_estimate -> scene",
+        "output.explain -> scene",
+        "output.fields -> scene",
+        "output.interface_fields -> scene",
+        "output.plots.deformed -> scene",
+        "output.plots.front_advance -> scene",
+        "output.tables -> scene",
+        "restart.fingerprint -> scene",
+        "restart.manager -> scene",
+        "restart.scene_state -> scene",
+    ],
+    "inside": [
+        "continuum.continuum -> continuum.thermal_strain",
+        "continuum.elastic -> continuum",
+        "continuum.neo_hookean -> continuum",
+        "continuum.term -> continuum.thermal_work",
+        "effects -> continuum",
+        "effects -> continuum.elastic",
+        "effects -> continuum.follower_pressure",
+        "effects -> continuum.inertia",
+        "effects -> continuum.neo_hookean",
+        "effects -> continuum.plasticity",
+        "effects -> continuum.thermal_strain",
+        "scene -> continuum.weak_form",
+        "scene -> solvers.newton",
+        "scene -> steps.newton_path",
+        "solvers.linear -> continuum.thermal_strain",
+    ],
+    "deep": [
+        "CyclicDriver",
+        "NewtonLoadPath",
+        "NewtonSolver",
+        "NewtonTrial",
+    ],
+    "cited": [
+        "fxcrack/interface/jump_coordinates.py: design.md",
+        "fxcrack/interface/supports.py: design.md",
+        "tests/specimens.py: reference.md",
+        "tests/test_coverage.py: spec.md",
+        "tests/test_criteria_fatigue.py: reference.md",
+        "tests/test_errors_and_warnings.py: spec.md",
+        "tests/test_fatigue.py: reference.md",
+        "tests/test_interface_pairing.py: design.md",
+        "tests/test_release_laws.py: design.md",
+        "tests/test_steps_growth.py: reference.md",
+        "tests/test_toughness_in_analysis.py: spec.md",
+        "tests/test_verification_specimens.py: reference.md",
+    ],
+}
+"""What still breaks the rules, exactly: an entry that is mended must go from the list."""
+
+
+@cache
+def modules() -> dict[str, ast.Module]:
+    """Syntax trees of the package's modules by their names without "fxcrack."."""
+    found = {}
+    for path in sorted((ROOT / "fxcrack").rglob("*.py")):
+        words = path.relative_to(ROOT / "fxcrack").with_suffix("").parts
+        name = ".".join(w for w in words if w != "__init__") or "public names"
+        found[name] = ast.parse(path.read_text(encoding="utf-8"))
+    return found
+
+
+def imports(tree: ast.AST) -> Iterator[str]:
+    """Modules that a syntax tree imports, those of fxcrack without "fxcrack."."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module in ("fxcrack", "fxcrack.output"):
+            found = [f"{node.module}.{alias.name}" for alias in node.names]
+        elif isinstance(node, ast.ImportFrom):
+            found = [node.module or ""]
+        else:
+            continue
+        for name in found:
+            yield "public names" if name == "fxcrack" else name.removeprefix("fxcrack.")
+
+
+def test_no_import_runs_upwards() -> None:
+    found = set()
+    for name, tree in modules().items():
+        for wanted in imports(tree):
+            here, there = name.partition(".")[0], wanted.partition(".")[0]
+            arrow = f"{name} -> {wanted}"
+            if there in ORDER and ORDER.index(there) > ORDER.index(here) and arrow not in ON_USE:
+                found.add(arrow)
+    assert sorted(found) == KNOWN["upwards"]
+
+
+def test_no_import_inside_a_function() -> None:
+    found = set()
+    for name, tree in modules().items():
+        functions = (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef))
+        found |= {f"{name} -> {wanted}" for f in functions for wanted in imports(f)}
+    assert all(any(arrow.startswith(known) for arrow in found) for known in ON_USE)
+    assert sorted(a for a in found if not a.startswith(tuple(ON_USE))) == KNOWN["inside"]
+
+
+def test_inheritance_is_flat() -> None:
+    bases = {
+        node.name: [ast.unparse(b).partition("[")[0].split(".")[-1] for b in node.bases]
+        for tree in modules().values()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.ClassDef)
+    }
+
+    def levels(name: str) -> int:
+        return max((1 + levels(b) for b in bases[name] if b in bases), default=0)
+
+    def is_error(name: str) -> bool:
+        return name == "FxcrackError" or any(is_error(b) for b in bases.get(name, []))
+
+    deep = sorted(name for name in bases if levels(name) > LEVELS and not is_error(name))
+    assert deep == KNOWN["deep"]
+
+
+def test_nothing_cites_a_file_that_is_not_here() -> None:
+    found = set()
+    for path in sorted(p for f in FOLDERS for p in (ROOT / f).rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        if ".md" not in text:
+            continue
+        tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+        texts = [t.string for t in tokens if t.type == tokenize.COMMENT]
+        documented = ast.Module, ast.ClassDef, ast.FunctionDef
+        texts += [
+            ast.get_docstring(n) or ""
+            for n in ast.walk(ast.parse(text))
+            if isinstance(n, documented)
+        ]
+        cited = set(re.findall(r"[\w/-]+\.md\b", " ".join(texts)))
+        found |= {f"{path.relative_to(ROOT)}: {c}" for c in cited if not (ROOT / c).is_file()}
+    assert sorted(found) == KNOWN["cited"]
