@@ -30,7 +30,7 @@ RUNGS: list[tuple[str, Any, dict[str, Any], dict[str, Any]]] = [
     ("contact", ELASTIC, {"contact": True}, {}),
     ("friction", ELASTIC, {"contact": True, "friction": 0.3}, {}),
     ("temperature", ELASTIC, {}, {"effects": [fx.Temperature(1.0)]}),
-    ("nonlinear path", ELASTIC, {}, {"path": "newton"}),
+    ("nonlinear solver", ELASTIC, {}, {"solver": "newton"}),
     ("finite strain", ELASTIC, {}, {"effects": [fx.FiniteStrain()]}),
     ("plasticity", fx.Plastic(70e3, 0.3, yield_stress=60.0, hardening=1e3), {}, {}),
 ]
