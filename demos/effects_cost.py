@@ -30,7 +30,7 @@ RUNGS: list[tuple[str, Any, dict[str, Any], dict[str, Any]]] = [
     ("contact", ELASTIC, {"contact": True}, {}),
     ("friction", ELASTIC, {"contact": True, "friction": 0.3}, {}),
     ("temperature", ELASTIC, {}, {"effects": [fx.Temperature(1.0)]}),
-    ("nonlinear path", ELASTIC, {}, {"path": "newton"}),
+    ("nonlinear solver", ELASTIC, {}, {"solver": "newton"}),
     ("finite strain", ELASTIC, {}, {"effects": [fx.FiniteStrain()]}),
     ("plasticity", fx.Plastic(70e3, 0.3, yield_stress=60.0, hardening=1e3), {}, {}),
 ]
@@ -77,16 +77,16 @@ def main(out: Path, fine: bool = False) -> None:
             name,
             seconds,
             seconds / bare,
-            found.path,
+            found.solver,
             str(found.counts["form terms"]),
             str(found.counts["factorisations"]),
-            str(found.unknowns["jumps in the window"]),
+            str(found.unknowns["retained jumps"]),
         ]
         for name, seconds, found in ladder
     ]
     table(
         "Seconds of one specimen with one effect more",
-        ["effect", "s", "over bare", "path", "form terms", "factorisations", "jumps"],
+        ["effect", "s", "over bare", "solver", "form terms", "factorisations", "jumps"],
         rows,
     )
 

@@ -42,7 +42,7 @@ def ellipse(g1, g2, g3, g1c, g2c, g3c):
     return np.sqrt((g1 / g1c) ** 2 + (g2 / g2c) ** 2 + (g3 / g3c) ** 2)
 
 
-def run(criterion, dx=0.5, length=100.0, path=None, release=fx.StepRelease(), count=6):  # noqa: B008
+def run(criterion, dx=0.5, length=100.0, solver=None, release=fx.StepRelease(), count=6):  # noqa: B008
     bond = fx.Interface("upper_face", "lower_face", lambda x: x[0] >= 30.0 - 1e-6, name="bond")
     clamps = [fx.Displacement(f"far_{side}", x=0.0, y=0.0) for side in ("upper", "lower")]
     scene = fx.Scene(
@@ -51,7 +51,7 @@ def run(criterion, dx=0.5, length=100.0, path=None, release=fx.StepRelease(), co
         model=fx.PlaneStress(),
         supports=[*clamps, fx.Displacement("pin_top", y=1.0)],
         debonds=[fx.Debond(bond, criterion, release)],
-        path=path,
+        solver=solver,
     )
     history = scene.run(fx.Static(until=fx.Releases(count)), progress=False)
     return history, [row for row in history if row["event"] == "onset"]

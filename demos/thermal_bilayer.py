@@ -81,7 +81,7 @@ def layers(dx: float) -> fx.Mesh:
 #
 # The crack grows from the free left end; the right end is a plane of symmetry. The toughness is
 # tabulated against the temperature of the bodies, which the interface takes over by itself.
-def run(dx: float = 0.25, until: float = 10.0, path: str | None = None) -> tuple[fx.Scene, Array]:
+def run(dx: float = 0.25, until: float = 10.0, solver: str | None = None) -> tuple[fx.Scene, Array]:
     """Cool from 300 degrees on; columns a, drop of the temperature, G over the closed form."""
     bond = fx.Interface(
         slave="upper_face", master="lower_face", bonded=lambda x: x[0] >= A0 - 1e-9, name="bond"
@@ -102,7 +102,7 @@ def run(dx: float = 0.25, until: float = 10.0, path: str | None = None) -> tuple
             )
         ],
         effects=[fx.Temperature(HOT - 1.0, reference=HOT)],
-        path=path,
+        solver=solver,
     )
     history = scene.run(fx.Static(until=fx.CrackLength(bond, until)))
     at = history["event"] == "onset"

@@ -1,25 +1,30 @@
-"""Effects a scene may ask for, and the solver path they need.
+"""Effects a scene may ask for, and the solver they need.
 
 A bare scene is linear and condensed once. Each effect adds one form term in the bodies, one load
 pattern or one law of the interface; what is not named does not exist in the scene: no form, no
-unknown, no memory, and its module is not even imported.
+unknown, no memory.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.elastic import Elastic
+from fxcrack.continuum.follower_pressure import FollowerPressure
+from fxcrack.continuum.inertia import Inertia, InertiaForces
 from fxcrack.continuum.loads import Load, Pressure
-from fxcrack.continuum.temperature import expansion_of
+from fxcrack.continuum.neo_hookean import NeoHookeanBodies
+from fxcrack.continuum.plasticity import Plasticity
+from fxcrack.continuum.temperature import Temperature, expansion_of
+from fxcrack.continuum.term import Term
+from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.interface.pairing import Interface
-
-if TYPE_CHECKING:
-    from fxcrack.continuum.term import Term
+from fxcrack.solvers.plan import SOLVERS, Plan
 
 
 @dataclass(frozen=True)
@@ -33,39 +38,26 @@ class FiniteStrain:
     """
 
 
-@dataclass(frozen=True)
-class Plan:
-    """How a scene is solved, and why.
-
-    Attributes:
-        path: "condensed" or "newton".
-        why: One sentence per reason.
-        effects: What is on, one sentence each.
-    """
-
-    path: str
-    why: tuple[str, ...]
-    effects: tuple[str, ...]
+_KNOWN = (FiniteStrain, Temperature, Inertia)
 
 
-def temperature_of(effects: Sequence[Any]) -> Any:
+def temperature_of(effects: Sequence[Any]) -> Temperature | None:
     """The temperature among some effects, ``None`` if there is none.
 
     Raises:
-        InputError: There are two, or one of the effects is none that a scene knows.
+        InputError: An effect is given twice, or is none that a scene knows.
     """
-    known = ("FiniteStrain", "Temperature", "Inertia")
     names = [type(e).__name__ for e in effects]
-    for name in names:
-        if name not in known:
+    for effect, name in zip(effects, names, strict=True):
+        if not isinstance(effect, _KNOWN):
             raise InputError(
-                f"effects: {name} is not an effect; known: {', '.join(known)} (friction belongs to "
-                "Interface, a pressure that follows to Pressure, plasticity to the material)"
+                f"effects: {name} is not an effect; known: {', '.join(k.__name__ for k in _KNOWN)} "
+                "(friction belongs to Interface, a pressure that follows to Pressure, plasticity "
+                "to the material)"
             )
         if names.count(name) > 1:
             raise InputError(f"effects: {name} is given twice; give it once")
-    found = [e for e, name in zip(effects, names, strict=True) if name == "Temperature"]
-    return found[0] if found else None
+    return next((e for e in effects if isinstance(e, Temperature)), None)
 
 
 def _forms(continuum: Continuum) -> set[str]:
@@ -73,29 +65,37 @@ def _forms(continuum: Continuum) -> set[str]:
     return {getattr(m, "form", "elastic") for m in continuum.part_materials}
 
 
+def _is_finite(forms: set[str], effects: Sequence[Any]) -> bool:
+    return any(isinstance(e, FiniteStrain) for e in effects) or "neo_hookean" in forms
+
+
+def _follows(load: Load) -> bool:
+    """Whether a load is a pressure that follows the bodies."""
+    return isinstance(load, Pressure) and load.follows
+
+
 def plan(
     continuum: Continuum,
     effects: Sequence[Any],
     loads: Sequence[Load],
     interfaces: Sequence[Interface],
-    path: str | None,
+    solver: str | None,
 ) -> Plan:
-    """Choose the solver path; collective.
+    """Choose the solver; collective.
 
     Args:
         continuum: Bodies with their materials and temperature.
         effects: What the scene asks for.
         loads: Its force patterns.
         interfaces: Its interfaces.
-        path: The path the user insists on, ``None`` for the cheapest that will do.
+        solver: The solver the user insists on, ``None`` for the cheapest that will do.
 
     Raises:
-        InputError: Effects that exclude each other, or a path that cannot serve them.
+        InputError: Effects that exclude each other, or a solver that cannot serve them.
     """
     why, on = [], []
     forms = _forms(continuum)
-    names = {type(e).__name__ for e in effects}
-    finite = "FiniteStrain" in names or "neo_hookean" in forms
+    finite = _is_finite(forms, effects)
     if finite and "plastic" in forms:
         raise InputError(
             "Plastic is a law for small strain and cannot stand beside finite strain; leave out "
@@ -109,13 +109,10 @@ def plan(
     if "plastic" in forms:
         on.append("plasticity: J2 with isotropic hardening")
         why.append("plasticity makes the bodies nonlinear")
-    follows = [x.title for x in loads if isinstance(x, Pressure) and getattr(x, "follows", False)]
-    for title in follows:
-        on.append(f"follower pressure '{title}'")
-        why.append(f"pressure '{title}' follows the bodies")
+    for load in filter(_follows, loads):
+        on.append(f"follower pressure '{load.title}'")
+        why.append(f"pressure '{load.title}' follows the bodies")
     if continuum.temperature is not None:
-        from fxcrack.continuum import thermal_strain as thermal
-
         if not any(
             hasattr(m, "temperatures") or expansion_of(m).any() for m in continuum.part_materials
         ):
@@ -124,66 +121,51 @@ def plan(
                 "expansion, unless only the interface depends on temperature"
             )
         on.append("temperature: thermal strain and what is tabulated against temperature")
-        if not thermal.is_linear(continuum):
+        if not is_linear(continuum):
             why.append("moduli change as the temperature does")
-    if "Inertia" in names:
+    if any(isinstance(e, Inertia) for e in effects):
         on.append("inertia: implicit dynamics")
         why.append("inertia is integrated in time, increment by increment")
     if any(i.contact for i in interfaces):
         on.append("contact of open faces")
-    if any(getattr(i, "friction", None) for i in interfaces):
+    if any(i.friction for i in interfaces):
         on.append("Coulomb friction of closed faces")
-    if path not in (None, "condensed", "newton"):
-        raise InputError(f"path = '{path}': choose 'condensed', 'newton' or None")
-    if why and path == "condensed":
+    if solver is not None and solver not in SOLVERS:
+        raise InputError(f"solver = '{solver}': choose 'linear', 'newton' or None")
+    if why and solver == "linear":
         raise InputError(
-            f"path='condensed' needs linear bodies, but {'; '.join(why)}; leave path out"
+            f"solver='linear' needs linear bodies, but {'; '.join(why)}; leave solver out"
         )
-    if path == "newton" and not why:
-        why.append("path='newton' was asked for; the bodies are linear")
+    if solver == "newton" and not why:
+        why.append("solver='newton' was asked for; the bodies are linear")
     if why:
         return Plan("newton", tuple(why), tuple(on))
-    return Plan("condensed", ("the bodies are linear: one factorisation serves",), tuple(on))
+    return Plan("linear", ("the bodies are linear: one factorisation serves",), tuple(on))
 
 
 def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Load]) -> list[Term]:
-    """Terms of the bodies on the Newton path, one per effect."""
+    """Terms of the bodies for the Newton solver, one per effect."""
     forms = _forms(continuum)
-    names = {type(e).__name__: e for e in effects}
     terms: list[Term] = []
     if "elastic" in forms:
-        from fxcrack.continuum.elastic import Elastic
-
-        finite = "FiniteStrain" in names or "neo_hookean" in forms
-        terms.append(Elastic(continuum, finite=finite))
+        terms.append(Elastic(continuum, finite=_is_finite(forms, effects)))
     if "neo_hookean" in forms:
-        from fxcrack.continuum.neo_hookean import NeoHookeanBodies
-
         terms.append(NeoHookeanBodies(continuum))
     if "plastic" in forms:
-        from fxcrack.continuum.plasticity import Plasticity
-
         terms.append(Plasticity(continuum))
-    for load in loads:
-        if isinstance(load, Pressure) and getattr(load, "follows", False):
-            from fxcrack.continuum.follower_pressure import FollowerPressure
-
-            terms.append(FollowerPressure(continuum, load))
-    if "Inertia" in names:
-        from fxcrack.continuum.inertia import InertiaForces
-
-        terms.append(InertiaForces(continuum, names["Inertia"]))
+    terms += [
+        FollowerPressure(continuum, x) for x in loads if isinstance(x, Pressure) and x.follows
+    ]
+    terms += [InertiaForces(continuum, e) for e in effects if isinstance(e, Inertia)]
     return terms
 
 
-def dead_loads(continuum: Continuum, loads: Sequence[Load], path: str) -> list[Any]:
+def dead_loads(continuum: Continuum, loads: Sequence[Load], solver: str) -> list[Any]:
     """The loads that are force patterns: those that follow the bodies are terms instead.
 
-    On the condensed path the temperature is a force pattern too.
+    For the linear solver the temperature is a force pattern too.
     """
-    out: list[Any] = [x for x in loads if not getattr(x, "follows", False)]
-    if continuum.temperature is not None and path == "condensed":
-        from fxcrack.continuum.thermal_strain import thermal_loads
-
+    out: list[Any] = [x for x in loads if not _follows(x)]
+    if continuum.temperature is not None and solver == "linear":
         out += thermal_loads(continuum)
     return out

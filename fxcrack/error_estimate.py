@@ -12,23 +12,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol, Self
 
 from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.history import History, Row
+from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.static import Static
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-    from fxcrack.steps.debond import Debond
 
 _MORE = 2.0
 """Estimated error of a first-order run over its difference from the second-order one."""
 _ORDERS = {1: "first", 2: "second"}
 _SMALL = 1e-6
 """Reactions below this share of the largest are round-off."""
+
+
+class Rerunnable(Protocol):
+    """What can be built again with changes and run: a scene."""
+
+    @property
+    def analysis(self) -> Analysis:
+        """Its analysis."""
+
+    def rebuilt(self, **changes: Any) -> Self:
+        """A new one with some arguments changed; collective."""
+
+    def run(self, step: Static | Cycles, *, grow: Sequence[Debond], progress: bool) -> History:
+        """Run a step; collective."""
+
+    def close(self) -> None:
+        """Free all PETSc objects; collective."""
 
 
 class AccuracyError(FxcrackError):
@@ -120,7 +135,7 @@ def check_accuracy(accuracy: float) -> None:
 
 
 def demand(
-    scene: Scene, step: Static | Cycles, accuracy: float, grow: Sequence[Debond]
+    scene: Rerunnable, step: Static | Cycles, accuracy: float, grow: Sequence[Debond]
 ) -> Estimate:
     """Estimate the errors of a scene's run and refuse it if they are too large; collective.
 
@@ -145,25 +160,26 @@ def demand(
     return estimate
 
 
-def estimate_errors(scene: Scene, step: Static | Cycles, grow: Sequence[Debond]) -> Estimate:
+def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Debond]) -> Estimate:
     """See :func:`demand`.
 
     Raises:
         AccuracyError: Nothing can be said; the message says why.
     """
     cycles = isinstance(step, Cycles)
-    ours, name, excess = _first(scene.history, grow, cycles=cycles)
-    order = scene.continuum.order
+    analysis = scene.analysis
+    ours, name, excess = _first(analysis.history, grow, cycles=cycles)
+    order = analysis.continuum.order
     # of an unknown power the smallest is assumed: it makes the error of the load the largest
     degree = min((d.criterion.degree or 1.0 for d in grow), default=1.0)
     rates = all(d.criterion.knows_toughness for d in grow)
     try:
-        twin = type(scene)(scene.mesh, **{**scene.parts, "order": 3 - order})
+        twin = scene.rebuilt(order=3 - order)
         try:
-            short = _to_onset(step, linear=scene.plan.path == "condensed")
+            short = _to_onset(step, linear=analysis.linear)
             twin.run(short, grow=grow, progress=False)
-            theirs, _, other = _first(twin.history, grow, cycles=cycles)
-            size = _size(twin, name)
+            theirs, _, other = _first(twin.analysis.history, grow, cycles=cycles)
+            size = _size(twin.analysis, name)
         finally:
             twin.close()
     except FxcrackError as error:
@@ -182,7 +198,7 @@ def estimate_errors(scene: Scene, step: Static | Cycles, grow: Sequence[Debond])
     return Estimate(
         load=more * load,
         G=more * rate,
-        stepping=_largest(scene.history, name) ** (1.0 / degree) - 1.0 if excess else 0.0,
+        stepping=_largest(analysis.history, name) ** (1.0 / degree) - 1.0 if excess else 0.0,
         cycles=life,
         order=order,
         size=size,
@@ -200,11 +216,11 @@ def _to_onset(step: Static | Cycles, *, linear: bool) -> Static | Cycles:
     return Static(Releases(1), stepping="path" if step.stepping == "path" else "event")
 
 
-def _size(scene: Scene, name: str) -> float:
+def _size(analysis: Analysis, name: str) -> float:
     """Mean element length at the front of an interface; that of all its facets without a front."""
-    growth = next(g for g in scene.cracks if g.title == name)
-    tips = growth.tips()
-    return float(tips.d_ahead.mean() if len(tips) else growth.front.surface.facet_size)
+    crack = next(g for g in analysis.cracks if g.title == name)
+    tips = crack.tips()
+    return float(tips.d_ahead.mean() if len(tips) else crack.front.surface.facet_size)
 
 
 def _first(history: History, grow: Sequence[Debond], *, cycles: bool) -> tuple[Row, str, float]:
@@ -227,7 +243,7 @@ def _first(history: History, grow: Sequence[Debond], *, cycles: bool) -> tuple[R
 
 
 def _largest(history: History, name: str) -> float:
-    """The largest f at which something was let go."""
+    """The largest f at which something was released."""
     rows = [r for r in history if r["event"] == "increment"]
     return max((float(r.get(f"f[{name}]", 0.0)) for r in rows), default=1.0)
 

@@ -1,8 +1,8 @@
 """The history of an analysis: a table with one row per event, and how it is written.
 
-Events: start and end of a step; "onset" (f = 1, just before nodes go; not in increment stepping),
-"release" (just after), "bend" (of an amplitude, in event stepping: everything is linear in time
-between rows), "snap" (softening bonds have run through unstable states), "increment".
+Events: start and end of a step; "onset" (f = 1, just before a release; not in increment stepping),
+"release" (just after), "bend" (an amplitude changes its slope, in event stepping: everything is
+linear in time between rows), "snap" (cohesive bonds have run through unstable states), "increment".
 
 Columns (brackets hold the name of a support, load, monitor or interface):
 time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[..] load factor and
@@ -41,7 +41,7 @@ class History:
     Attributes:
         rows: One dictionary per row.
         reason: Why the last step ended.
-        details: What else is worth keeping (timings, window, releases), plain types only.
+        details: What else is worth keeping (timings, retained jumps, releases), plain types only.
     """
 
     def __init__(self, comm: MPI.Comm) -> None:

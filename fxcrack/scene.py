@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -26,29 +28,101 @@ from fxcrack.continuum.loads import (
     Traction,
 )
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.error_estimate import as_details, check_accuracy, demand
 from fxcrack.history import History, Row
 from fxcrack.interface.front import why_no_tip
-from fxcrack.interface.pairing import Interface, make_pair
-from fxcrack.interface.supports import collect_supports, warn_of_held_bonds
+from fxcrack.interface.pairing import Interface, Pair, make_pair
+from fxcrack.interface.supports import Supports, collect_supports, warn_of_held_bonds
 from fxcrack.mesh import Mesh
 from fxcrack.output.explain import Explanation, explain
 from fxcrack.restart.checkpoint import Checkpoint
-from fxcrack.restart.manager import RestartManager, restart_manager
+from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.base import Solver
 from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.solvers.options import NewtonOptions
+from fxcrack.steps.analysis import Analysis, EnergyBalance
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.cycles import Cycles, check_criteria
-from fxcrack.steps.cyclic import CyclicDriver
+from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import CrackLength
-from fxcrack.steps.force_ramps import ForceRamp
 from fxcrack.steps.progress import Progress
-from fxcrack.steps.quasi_static import Observer, QuasiStaticDriver
+from fxcrack.steps.quasi_static import run_static
+from fxcrack.steps.rows import Observer
 from fxcrack.steps.static import Dynamic, Static
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SceneInput:
+    """What a scene is made of, as data: a scene can be built from it again.
+
+    Attributes as the arguments of :class:`Scene`.
+
+    Raises:
+        InputError: A part is of the wrong kind, or names are used twice.
+    """
+
+    mesh: Mesh
+    materials: Material | Mapping[str, Material]
+    model: Model
+    supports: Sequence[Displacement] = ()
+    loads: Sequence[Load] = ()
+    debonds: Sequence[Debond] = ()
+    bonds: Sequence[Interface] = ()
+    monitors: Sequence[Monitor] = ()
+    order: int | None = None
+    options: CondensedOptions | None = None
+    effects: Sequence[Any] = ()
+    solver: str | None = None
+    newton: NewtonOptions | None = None
+
+    def __post_init__(self) -> None:
+        """Check kinds and names."""
+        check_instance("Scene", "mesh", self.mesh, Mesh, "read_mesh('mine.msh')")
+        check_instance(
+            "Scene", "model", self.model, (PlaneStrain, PlaneStress, Axisymmetric, Solid), "Solid()"
+        )
+        self._take_list("supports", Displacement)
+        self._take_list("loads", (Traction, Pressure, BodyForce, PointForce))
+        check_amplitudes([*self.supports, *self.loads])
+        warn_of_same_titles("loads", self.loads)
+        self._take_list("debonds", Debond)
+        self._take_list("bonds", Interface)
+        self._take_list("monitors", Monitor)
+        warn_of_same_titles("monitors", self.monitors)
+        if self.newton is not None:
+            check_instance(
+                "Scene", "newton", self.newton, NewtonOptions, "NewtonOptions(max_iterations=40)"
+            )
+        if self.options is not None:
+            check_instance(
+                "Scene", "options", self.options, CondensedOptions, "CondensedOptions(rows=2.0)"
+            )
+        if not isinstance(self.effects, Sequence):
+            raise InputError(
+                f"Scene: effects must be a list, not {type(self.effects).__name__}; write "
+                "effects=[...]"
+            )
+        titles = [i.title for i in self.interfaces]
+        for title in titles:
+            if titles.count(title) > 1:
+                raise InputError(
+                    f"interface '{title}' appears twice; give one criterion per interface and "
+                    "different names to different interfaces"
+                )
+
+    def _take_list(self, name: str, kinds: type | tuple[type, ...]) -> None:
+        """Check a list of parts and keep a copy."""
+        object.__setattr__(self, name, check_list("Scene", name, getattr(self, name), kinds))
+
+    @property
+    def interfaces(self) -> list[Interface]:
+        """Those that may debond, then those that stay as they are."""
+        return [d.interface for d in self.debonds] + list(self.bonds)
 
 
 class Scene:
@@ -67,9 +141,14 @@ class Scene:
         options: How the continuum is condensed.
         effects: What the bodies do beyond small linear elasticity: :class:`FiniteStrain`,
             :class:`Temperature`, :class:`Inertia`.
-        path: "newton" sends a scene without such effects through the nonlinear solver all the
-            same; by default the effects decide.
+        solver: "newton" sends a scene without such effects through the nonlinear solver all the
+            same; by default the effects decide between it and "linear".
         newton: Controls of the nonlinear solver, where it is used.
+        path: Former name of ``solver``, deprecated; "condensed" stands for "linear".
+
+    Attributes:
+        input: The arguments, from which :meth:`rebuilt` builds another scene.
+        analysis: What the scene is made of and all that changes while its steps are run.
 
     Raises:
         InputError: The parts contradict each other; the message says which and how to mend it.
@@ -89,94 +168,99 @@ class Scene:
         order: int | None = None,
         options: CondensedOptions | None = None,
         effects: Sequence[Any] = (),
-        path: str | None = None,
+        solver: str | None = None,
         newton: NewtonOptions | None = None,
+        path: str | None = None,
     ) -> None:
-        self.parts = {k: v for k, v in locals().items() if k not in ("self", "mesh")}
-        check_instance("Scene", "mesh", mesh, Mesh, "read_mesh('mine.msh')")
-        check_instance(
-            "Scene", "model", model, (PlaneStrain, PlaneStress, Axisymmetric, Solid), "Solid()"
+        self.input = SceneInput(
+            mesh=mesh,
+            materials=materials,
+            model=model,
+            supports=supports,
+            loads=loads,
+            debonds=debonds,
+            bonds=bonds,
+            monitors=monitors,
+            order=order,
+            options=options,
+            effects=effects,
+            solver=solver if path is None else _solver_of_path(path, solver),
+            newton=newton,
         )
-        supports = check_list("Scene", "supports", supports, Displacement)
-        loads = check_list("Scene", "loads", loads, (Traction, Pressure, BodyForce, PointForce))
-        check_amplitudes([*supports, *loads])
-        warn_of_same_titles("loads", loads)
-        debonds = check_list("Scene", "debonds", debonds, Debond)
-        bonds = check_list("Scene", "bonds", bonds, Interface)
-        monitors = check_list("Scene", "monitors", monitors, Monitor)
-        warn_of_same_titles("monitors", monitors)
-        if newton is not None:
-            check_instance(
-                "Scene", "newton", newton, NewtonOptions, "NewtonOptions(max_iterations=40)"
-            )
-        if options is not None:
-            check_instance(
-                "Scene", "options", options, CondensedOptions, "CondensedOptions(rows=2.0)"
-            )
-        if not isinstance(effects, Sequence):
-            raise InputError(
-                f"Scene: effects must be a list, not {type(effects).__name__}; write effects=[...]"
-            )
-        interfaces = [d.interface for d in debonds] + bonds
-        titles = [i.title for i in interfaces]
-        for title in titles:
-            if titles.count(title) > 1:
-                raise InputError(
-                    f"interface '{title}' appears twice; give one criterion per interface and "
-                    "different names to different interfaces"
-                )
-        self.mesh = mesh
-        self.debonds = debonds
-        self.effects = list(effects)
-        self.continuum = Continuum(
-            mesh, materials, model, order=order, temperature=temperature_of(self.effects)
-        )
-        self.pairs = [make_pair(self.continuum, i) for i in interfaces]
-        check_friction(self.debonds, self.pairs)
-        self.supports = collect_supports(self.continuum, supports)
-        self.plan = plan(self.continuum, self.effects, loads, interfaces, path)
-        self.loads = dead_loads(self.continuum, loads, self.plan.path)
-        parts = self.continuum, self.pairs, self.supports, self.loads, monitors
-        self.solver: Solver
-        if self.plan.path == "condensed":
-            self.solver = LinearSolver(*parts, options or CondensedOptions())
-        else:
-            from fxcrack.continuum.weak_form import WeakForm
-            from fxcrack.solvers.newton import NewtonSolver  # only scenes that need it pay
+        self.analysis = _analysis(self.input)
+        self._files = RunFiles()
 
-            terms = form_terms(self.continuum, self.effects, loads)
-            self.solver = NewtonSolver(
-                *parts,
-                options or CondensedOptions(rows=0.0),
-                bodies=WeakForm(self.continuum, terms),
-                newton=newton or NewtonOptions(),
-            )
-        self.cracks: list[Crack] = []
-        self.time = 0.0
-        self._work = 0.0
-        self._released = 0.0
-        self._snapped = 0.0
-        self._viscous = 0.0
-        self.ramps: list[ForceRamp] = []
-        self._increment = 0
-        self.fatigue = FatigueState()
-        self.history = History(mesh.comm)
-        self._started = False
-        self.steps = 0
-        self.run_id = ""
-        self.kept: tuple[Checkpoint, Path, bool] | None = None
+    def rebuilt(self, **changes: Any) -> Scene:
+        """A new scene of the same input; collective.
+
+        Args:
+            **changes: Arguments of :class:`Scene` that are to be others.
+        """
+        given = {f.name: getattr(self.input, f.name) for f in fields(self.input)}
+        return type(self)(**{**given, **changes})
+
+    @property
+    def mesh(self) -> Mesh:
+        """The mesh."""
+        return self.input.mesh
+
+    @property
+    def debonds(self) -> Sequence[Debond]:
+        """Interfaces that may come apart."""
+        return self.analysis.debonds
+
+    @property
+    def continuum(self) -> Continuum:
+        """The bodies."""
+        return self.analysis.continuum
+
+    @property
+    def pairs(self) -> list[Pair]:
+        """Paired interfaces: those of the debonds, then the bonds."""
+        return self.analysis.pairs
+
+    @property
+    def supports(self) -> Supports:
+        """Prescribed displacement components."""
+        return self.solver.supports
+
+    @property
+    def loads(self) -> list[Load]:
+        """Force patterns; pressures that follow the bodies are not among them."""
+        return self.solver.loads
+
+    @property
+    def solver(self) -> Solver:
+        """The solver with its present equilibrium."""
+        return self.analysis.solver
+
+    @property
+    def cracks(self) -> list[Crack]:
+        """One per debond, once a step was run."""
+        return self.analysis.cracks
+
+    @property
+    def fatigue(self) -> FatigueState:
+        """What cycles leave behind for later ones."""
+        return self.analysis.fatigue
+
+    @property
+    def time(self) -> float:
+        """Present time."""
+        return self.analysis.time
+
+    @property
+    def history(self) -> History:
+        """Rows of all steps so far."""
+        return self.analysis.history
+
+    @history.setter
+    def history(self, history: History) -> None:
+        self.analysis.history = history
 
     def loads_at(self, time: float) -> Array:
-        """Amplitudes of all supports and load factors at a time."""
-        values = [c.coordinate(time) for c in self.supports.columns]
-        return np.array(values + [load.amplitude(time) for load in self.loads])
-
-    def _breaks(self) -> tuple[float, ...]:
-        moving = [c.support.amplitude for c in self.supports.columns if c.moves]
-        every = moving + [load.amplitude for load in self.loads]
-        if self.continuum.temperature is not None:
-            every += self.continuum.temperature.amplitudes
-        return tuple(sorted({b for a in every for b in a.breaks()}))
+        """Amplitudes of all supports and load factors at a time, shape (n_loads,)."""
+        return self.analysis.loads_at(time)
 
     def run(
         self,
@@ -217,116 +301,102 @@ class Scene:
             check_accuracy(accuracy)
         check_instance("run", "step", step, (Static, Cycles), "Static(until=Time(1.0))")
         chosen = self.debonds if grow is None else check_list("run", "grow", grow, Debond)
+        self._check_step(step, chosen)
+        analysis = self.analysis
+        may_grow = [d in chosen for d in self.debonds]
+        may_grow += [False] * (len(self.pairs) - len(self.debonds))
+        analysis.activate(chosen)
+        for g in analysis.active:
+            if not len(g.tips()):
+                log.warn("%s, so nothing can debond", why_no_tip(g.front))
+        restarts = self._files.manager(analysis, step, may_grow, checkpoint, restart, save)
+        self._prepare(restarts, may_grow, step)
+        self.history.reason = restarts.finished or self._go(
+            step, restarts, progress=progress, observers=observers
+        )
+        self.history.details = self._details()
+        if accuracy is not None:
+            self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
+        return self.history
+
+    def _check_step(self, step: Static | Cycles, chosen: Sequence[Debond]) -> None:
+        """Refuse steps that the scene cannot run."""
         for debond in chosen:
             if debond not in self.debonds:
                 raise InputError(
                     f"debond of interface '{debond.interface.title}' is not part of the scene"
                 )
         check_criteria(step, chosen)
-        if isinstance(step, Dynamic) and not any(isinstance(e, Inertia) for e in self.effects):
+        effects, why = self.analysis.effects, self.analysis.plan.why
+        if isinstance(step, Dynamic) and not any(isinstance(e, Inertia) for e in effects):
             raise InputError(
                 "Dynamic moves bodies that have inertia, and the scene has none; write "
                 "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
             )
-        active = [d in chosen for d in self.debonds]
-        active += [False] * (len(self.pairs) - len(self.debonds))
-        if not self._started:
-            self.cracks = [Crack(self.solver, p, d) for p, d in enumerate(self.debonds)]
-        cracks = [g for g, on in zip(self.cracks, active, strict=False) if on]
-        for g in cracks:
-            if not len(g.tips()):
-                log.warn("%s, so nothing can debond", why_no_tip(g.front))
-        keeper = restart_manager(self, step, active, checkpoint, restart, save)
-        self.solver.prepare(active, self._reach(step))
-        if keeper.resume is not None:
-            keeper.put_in_equilibrium()
-            self._take_books(keeper.resume)
-            self._started = True
-        elif not self._started:
-            for pair, held in zip(self.pairs, self.solver.held_by_supports, strict=True):
+        if isinstance(step, Cycles) and not self.analysis.linear:
+            raise InputError(
+                "fatigue steps need linear bodies, but this scene takes the nonlinear solver "
+                f"({'; '.join(why)}); leave that effect out, or run Static steps"
+            )
+
+    def _prepare(
+        self, restarts: RestartManager, may_grow: list[bool], step: Static | Cycles
+    ) -> None:
+        """Condense around the present fronts and find the equilibrium to begin with."""
+        analysis, solver = self.analysis, self.solver
+        solver.prepare(may_grow, self._reach(step))
+        if restarts.resumes:
+            restarts.put_in_equilibrium()
+        elif not analysis.started:
+            for pair, held in zip(self.pairs, solver.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
-            self.solver.start()
-            self._started = True
-        self.history.reason = keeper.finished or self._go(
-            cracks, step, keeper, progress=progress, observers=observers
-        )
-        self.history.details = {
-            "dofs": self.continuum.n_global,
-            "window": self.solver.system.n_retained,
-            "releases": sum(g.n_released for g in self.cracks),
-            "factorizations": self.solver.timings.factorizations,
-            "ranks": self.mesh.comm.size,
-            "contact_steps": self.solver.system.contact_steps,
-            "seconds": dict(self.solver.timings.seconds),
-        }
-        if self.fatigue.table["N"]:
-            self.history.details["tips"] = self.fatigue.table
-        if accuracy is not None:
-            self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
-        return self.history
+            solver.start()
+        analysis.started = True
 
     def _go(
         self,
-        cracks: list[Crack],
         step: Static | Cycles,
-        keeper: RestartManager,
+        restarts: RestartManager,
         *,
         progress: bool,
         observers: Sequence[Observer],
     ) -> str:
-        """March; returns why the step ended."""
-        with keeper, Progress(self.mesh.comm, enabled=progress) as show:
+        """Run the step; returns why it ended."""
+        with restarts, Progress(self.mesh.comm, enabled=progress) as show:
             every: list[Observer] = [show, *observers]
 
             def tell(event: str, row: Row) -> None:
                 for observe in every:
                     observe(event, row)
 
-            march = self._march(
-                cracks,
-                step,
-                time=self.time,
-                work=self._work,
-                released=self._released,
-                snapped=self._snapped,
-                viscous=self._viscous,
-                ramps=self.ramps,
-                increment=self._increment,
-                observer=tell,
-                checkpoint_point=keeper.checkpoint_point if keeper.wanted else None,
-                resume=keeper.resume,
-            )
-            try:
-                reason = march.run()
-            finally:
-                self._take_books(march.carried())
+            controls: dict[str, Any] = {
+                "observer": tell,
+                "checkpoint_point": restarts.checkpoint_point if restarts.wanted else None,
+                "resume": restarts.progress,
+            }
+            if isinstance(step, Cycles):
+                reason = run_cycles(self.analysis, step, **controls)
+            else:
+                reason = run_static(self.analysis, step, **controls)
             self.history.reason = reason
-            keeper.finish(march, reason)
+            restarts.finish(reason)
             return reason
 
-    def _take_books(self, books: dict[str, Any]) -> None:
-        """Time and energies of a march."""
-        self.time, self._work, self._released = books["time"], books["work"], books["released"]
-        self._snapped, self._viscous = books["snapped"], books["viscous"]
-        self._increment = books["increment"]
-
-    def _march(
-        self, cracks: list[Crack], step: Static | Cycles, **carried: Any
-    ) -> QuasiStaticDriver:
-        common = self.history, self.loads_at, self._breaks()
-        if self.plan.path == "newton":
-            from fxcrack.steps.newton_path import NewtonLoadPath
-
-            if isinstance(step, Cycles):
-                raise InputError(
-                    "fatigue steps need linear bodies, but this scene takes the nonlinear path "
-                    f"({'; '.join(self.plan.why)}); leave that effect out, or run Static steps"
-                )
-            return NewtonLoadPath(self.solver, cracks, step, *common, **carried)
-        if isinstance(step, Cycles):
-            carried["fatigue"] = self.fatigue
-            return CyclicDriver(self.solver, cracks, step, *common, **carried)
-        return QuasiStaticDriver(self.solver, cracks, step, *common, **carried)
+    def _details(self) -> dict[str, Any]:
+        """What else is worth keeping with the history, plain types only."""
+        solver = self.solver
+        details: dict[str, Any] = {
+            "dofs": self.continuum.n_global,
+            "window": solver.system.n_retained,
+            "releases": sum(g.n_released for g in self.cracks),
+            "factorizations": solver.timings.factorizations,
+            "ranks": self.mesh.comm.size,
+            "contact_steps": solver.system.contact_steps,
+            "seconds": dict(solver.timings.seconds),
+        }
+        if self.fatigue.table["N"]:
+            details["tips"] = self.fatigue.table
+        return details
 
     def _reach(self, step: Static | Cycles) -> list[float]:
         """How far each crack may grow in a step, length."""
@@ -334,7 +404,7 @@ class Scene:
         for end in step.ends:
             if isinstance(end, CrackLength):
                 for g in self.cracks:
-                    if self.pairs[g.p].interface is end.interface:
+                    if g.debond.interface is end.interface:
                         ahead = end.length - g.extent.length(g.tips())
                         size = self.pairs[g.p].surface.facet_size
                         if self.mesh.gdim == 3:
@@ -361,4 +431,53 @@ class Scene:
         self.solver.destroy()
 
 
-__all__ = ["Debond", "Scene"]
+def _solver_of_path(path: str, solver: str | None) -> str:
+    """The solver that the former argument ``path`` asked for, with a warning."""
+    warnings.warn(
+        "Scene(path=...) is now called Scene(solver=...), with solver='linear' for "
+        "path='condensed'; the former name will be removed",
+        DeprecationWarning,
+        stacklevel=3,
+    )
+    if solver is not None:
+        raise InputError("Scene: path is the former name of solver; give solver alone")
+    return "linear" if path == "condensed" else path
+
+
+def _analysis(given: SceneInput) -> Analysis:
+    """The analysis of a scene; collective."""
+    continuum = Continuum(
+        given.mesh,
+        given.materials,
+        given.model,
+        order=given.order,
+        temperature=temperature_of(given.effects),
+    )
+    pairs = [make_pair(continuum, i) for i in given.interfaces]
+    check_friction(given.debonds, pairs)
+    supports = collect_supports(continuum, list(given.supports))
+    chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
+    loads = dead_loads(continuum, given.loads, chosen.solver)
+    parts = continuum, pairs, supports, loads, list(given.monitors)
+    solver: Solver
+    if chosen.solver == "linear":
+        solver = LinearSolver(*parts, given.options or CondensedOptions())
+    else:
+        solver = NewtonSolver(
+            *parts,
+            given.options or CondensedOptions(rows=0.0),
+            bodies=WeakForm(continuum, form_terms(continuum, given.effects, given.loads)),
+            newton=given.newton or NewtonOptions(),
+        )
+    return Analysis(
+        continuum,
+        solver,
+        list(given.debonds),
+        chosen,
+        list(given.effects),
+        History(given.mesh.comm),
+        EnergyBalance(),
+    )
+
+
+__all__ = ["Debond", "Scene", "SceneInput"]

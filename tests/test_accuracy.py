@@ -216,13 +216,7 @@ def test_what_cannot_be_judged_is_said() -> None:
     scene = case.scene
     n = scene.pairs[0].surface.n_nodes
     bond = scene.debonds[0].interface
-    other = fx.Scene(
-        scene.mesh,
-        **{
-            **scene.parts,
-            "debonds": [fx.Debond(bond, fx.VCCT(GIc=[10.0] * n))],
-        },
-    )
+    other = scene.rebuilt(debonds=[fx.Debond(bond, fx.VCCT(GIc=[10.0] * n))])
     with pytest.raises(AccuracyError, match=r"cannot be judged.*fxcrack accuracy"):
         other.run(case.step, accuracy=0.1, progress=False)
     other.close()

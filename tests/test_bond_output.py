@@ -165,7 +165,7 @@ def test_history_of_chosen_bonds(shared_path: Path, comm: MPI.Intracomm) -> None
             table = list(csv.DictReader(stream))
         assert [float(r["CRSTS11"]) for r in table] == [row["CRSTS11"] for row in last]
     text = fx.bond_table(scene)
-    assert f"interface 'bond': {len(last)} bonds have let go" in text
+    assert f"interface 'bond': {len(last)} bonds released" in text
     assert all(name in text for name in ("DBT", "DBS11", "CRSTS13", "OPENBC11", "EFENRRTR"))
     assert len(set(comm.allgather(text))) == 1
     scene.close()

@@ -66,7 +66,7 @@ def history(mesh: fx.Mesh, *, contact: bool = False, **options: object) -> fx.Hi
 @pytest.mark.mpi
 @pytest.mark.parametrize(
     ("order", "contact", "options"),
-    [(1, True, {}), (2, False, {}), (1, False, {"path": "newton"})],
+    [(1, True, {}), (2, False, {}), (1, False, {"solver": "newton"})],
 )
 def test_border_inside_a_body(
     comm: MPI.Comm, order: int, contact: bool, options: dict[str, object]

@@ -154,7 +154,7 @@ def test_path_stepping_has_no_time() -> None:
     curve = fx.CrackLengthVsTime((0.0, 1.0), (0.5, 2.0), reference="upper_face")
     amplitude = fx.AmplitudeRelease((0.0, 1.0), (1.0, 0.0))
     for scene in (plate(curve), plate(STRESS, release=amplitude)):
-        with pytest.raises(fx.InputError, match="'bond' grows or lets go with time, which"):
+        with pytest.raises(fx.InputError, match="'bond' grows or is released with time, which"):
             run(scene, fx.Releases(2), stepping="path")
 
 

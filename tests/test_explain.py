@@ -39,9 +39,9 @@ def test_a_bare_scene_has_one_term_one_factorisation_and_nothing_else() -> None:
     bare = scene(ELASTIC)
     grow_to(bare, 34.0)
     found = bare.explain()
-    assert found.path == "condensed" and found.effects == ()
+    assert found.solver == "linear" and found.effects == ()
     assert found.counts == {"form terms": 1, "factorisations": 1}
-    assert set(found.unknowns) == {"displacements", "jumps in the window"}
+    assert set(found.unknowns) == {"displacements", "retained jumps"}
     assert found.costs == {} and found.phases["factor_with_schur"] > 0.0
 
 
@@ -58,12 +58,12 @@ def test_an_effect_adds_what_it_needs(name: str, capsys: pytest.CaptureFixture[s
     assert found.unknowns["displacements"] == plain.unknowns["displacements"]
     assert found.counts["form terms"] == 1
     if name in ("finite strain", "neo-Hookean", "plasticity"):
-        assert found.path == "newton" and found.counts["factorisations"] > 1
+        assert found.solver == "newton" and found.counts["factorisations"] > 1
         assert sum(found.costs.values()) > 0.0
     else:
-        assert found.path == "condensed" and found.counts["factorisations"] == 1
+        assert found.solver == "linear" and found.counts["factorisations"] == 1
     # jumps that may touch or rub are unknowns of the window; other effects add none
-    extra = found.unknowns["jumps in the window"] - plain.unknowns["jumps in the window"]
+    extra = found.unknowns["retained jumps"] - plain.unknowns["retained jumps"]
     assert (extra > 0) == (name in ("contact", "friction"))
     assert ("contact nodes" in found.unknowns) == (name in ("contact", "friction"))
     assert ("friction nodes" in found.unknowns) == (name == "friction")
@@ -82,15 +82,26 @@ def test_two_terms_where_two_effects_meet() -> None:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"effects": [fx.FiniteStrain()], "path": "condensed"}, "needs linear bodies"),
+        ({"effects": [fx.FiniteStrain()], "solver": "linear"}, "needs linear bodies"),
         ({"effects": [fx.FiniteStrain(), fx.FiniteStrain()]}, "given twice"),
         ({"effects": ["wind"]}, "is not an effect"),
-        ({"path": "fast"}, "choose 'condensed', 'newton' or None"),
+        ({"solver": "fast"}, "choose 'linear', 'newton' or None"),
     ],
 )
 def test_effects_that_cannot_be_are_refused(more: dict[str, Any], message: str) -> None:
     with pytest.raises(fx.InputError, match=message):
         scene(ELASTIC, **more)
+
+
+def test_the_former_name_of_the_solver_still_works() -> None:
+    for path, solver in (("condensed", "linear"), ("newton", "newton")):
+        with pytest.warns(DeprecationWarning, match=r"now called Scene\(solver"):
+            found = scene(ELASTIC, path=path).explain()
+        assert found.solver == solver
+        with pytest.warns(DeprecationWarning, match=r"now called Explanation\.solver"):
+            assert found.path == path
+    with pytest.raises(fx.InputError, match="give solver alone"), pytest.warns(DeprecationWarning):
+        scene(ELASTIC, path="newton", solver="newton")
 
 
 def test_plasticity_and_finite_strain_exclude_each_other() -> None:

@@ -40,8 +40,8 @@ STATIC: dict[str, dict[str, Any]] = {
     "stepping", [pytest.param("event", marks=pytest.mark.mpi), "increment", "path"]
 )
 def test_linear_bodies_give_the_condensed_history(comm: MPI.Intracomm, stepping: str) -> None:
-    def run(path: str | None) -> fx.History:
-        scene = dcb(comm, dx=2.0, ny=2, path=path, criterion=fx.VCCT(GIc=0.2, tolerance=0.3))
+    def run(solver: str | None) -> fx.History:
+        scene = dcb(comm, dx=2.0, ny=2, solver=solver, criterion=fx.VCCT(GIc=0.2, tolerance=0.3))
         return grow_to(scene, 36.0, stepping=stepping, **STATIC[stepping])
 
     one, other = run(None), run("newton")
@@ -50,7 +50,7 @@ def test_linear_bodies_give_the_condensed_history(comm: MPI.Intracomm, stepping:
 
 
 def test_linear_bodies_with_bonds_that_soften(comm: MPI.Intracomm) -> None:
-    def run(path: str | None) -> fx.History:
+    def run(solver: str | None) -> fx.History:
         interface = bond(30.0)
         scene = fx.Scene(
             dcb_2d(comm, dx=2.0, ny=2),
@@ -58,7 +58,7 @@ def test_linear_bodies_with_bonds_that_soften(comm: MPI.Intracomm) -> None:
             model=fx.PlaneStrain(),
             supports=PINS,
             debonds=[fx.Debond(interface, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())],
-            path=path,
+            solver=solver,
         )
         return scene.run(fx.Static(until=fx.CrackLength(interface, 36.0)))
 
@@ -67,7 +67,7 @@ def test_linear_bodies_with_bonds_that_soften(comm: MPI.Intracomm) -> None:
 
 @pytest.mark.mpi
 def test_linear_bodies_with_contact(comm: MPI.Intracomm) -> None:
-    def run(path: str | None) -> fx.History:
+    def run(solver: str | None) -> fx.History:
         interface = bond(36.0, contact=True)
         scene = fx.Scene(
             enf_2d(comm, dx=4.0, ny=2),
@@ -79,7 +79,7 @@ def test_linear_bodies_with_contact(comm: MPI.Intracomm) -> None:
                 fx.Displacement("load", y=-1.0),
             ],
             debonds=[fx.Debond(interface, fx.VCCT(GIc=0.2, GIIc=0.5, mix=fx.BK(eta=1.6)))],
-            path=path,
+            solver=solver,
         )
         return scene.run(fx.Static(until=fx.Releases(2)))
 
@@ -145,7 +145,7 @@ def test_unloading_to_nothing_and_loading_the_other_way(finite: bool, first: flo
             ],
             contact=True,
             effects=[FiniteStrain()] if finite else [],
-            path="newton",
+            solver="newton",
         )
         step = fx.Static(until=fx.Time(len(pins) - 1.0), stepping="increment", maximum=0.5)
         return scene.run(step)

@@ -453,7 +453,7 @@ def test_total_separation(method: str) -> None:
         criterion=fx.VCCT(GIc=0.2, method=method),
     )
     history = scene.run(fx.Static(until=fx.CrackLength(interface_of(scene), 50.0)))
-    assert history.reason.startswith("total separation: letting the next node go would leave")
+    assert history.reason.startswith("total separation: releasing the next node would leave")
     end = history.rows[-1]
     assert end["a[bond]"] == pytest.approx(19.0)
     assert end["released[bond]"] == len([r for r in history if r["event"] == "release"]) == 4

@@ -12,7 +12,7 @@ from specimens import PINS, STEEL, bond, dcb, interface_of
 import fxcrack as fx
 from fxcrack.base.errors import InputError
 from fxcrack.meshes.dcb import dcb_2d
-from fxcrack.steps.increment_stepping import IncrementControl, TooManyCutbacks
+from fxcrack.steps.increment_control import IncrementControl, TooManyCutbacks
 
 END = fx.Time(1.0)
 

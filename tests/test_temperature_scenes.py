@@ -15,7 +15,7 @@ HELD = fx.Amplitude((0.0, 1.0), (0.0, 1.0))
 TOUGHNESS = fx.Tabulated([20.0, 120.0], [0.2, 0.05])
 
 
-def heated_dcb(comm: MPI.Intracomm, path: str | None) -> fx.Scene:
+def heated_dcb(comm: MPI.Intracomm, solver: str | None) -> fx.Scene:
     """Opened until time 1, then heated from 20 to 120 degrees; nothing expands."""
     return fx.Scene(
         dcb_2d(comm, dx=2.0, ny=2),
@@ -27,7 +27,7 @@ def heated_dcb(comm: MPI.Intracomm, path: str | None) -> fx.Scene:
         ],
         debonds=[fx.Debond(bond(30.0), fx.VCCT(GIc=TOUGHNESS))],
         effects=[fx.Temperature(120.0, reference=20.0, amplitude=HEATED)],
-        path=path,
+        solver=solver,
     )
 
 
@@ -55,8 +55,8 @@ def test_toughness_follows_the_temperature_on_the_nonlinear_path(comm: MPI.Intra
 
 
 @pytest.mark.quick("None")
-@pytest.mark.parametrize("path", [None, "newton"])
-def test_a_steady_temperature_loads_the_bodies_at_once(path: str | None) -> None:
+@pytest.mark.parametrize("solver", [None, "newton"])
+def test_a_steady_temperature_loads_the_bodies_at_once(solver: str | None) -> None:
     steel, other = (fx.Isotropic(200e3, 0.3, expansion=a) for a in (1e-5, 2e-5))
     scene = fx.Scene(
         dcb_2d(dx=2.0, ny=2),
@@ -65,7 +65,7 @@ def test_a_steady_temperature_loads_the_bodies_at_once(path: str | None) -> None
         supports=[fx.Displacement("pin_bottom", x=0.0, y=0.0), fx.Displacement("far_lower", x=0.0)],
         debonds=[fx.Debond(bond(30.0), fx.VCCT(GIc=1e3))],
         effects=[fx.Temperature(-100.0, amplitude=fx.Amplitude((0.0,), (1.0,)))],
-        path=path,
+        solver=solver,
     )
     history = scene.run(fx.Static(until=fx.Time(1.0)))
     assert history["GI[bond]"][0] + history["GII[bond]"][0] > 0.0
@@ -75,7 +75,7 @@ def test_a_steady_temperature_loads_the_bodies_at_once(path: str | None) -> None
 
 
 def test_cooling_on_both_paths() -> None:
-    def run(path: str | None) -> fx.History:
+    def run(solver: str | None) -> fx.History:
         scene = fx.Scene(
             dcb_2d(dx=2.0, ny=2),
             materials={
@@ -89,7 +89,7 @@ def test_cooling_on_both_paths() -> None:
             ],
             debonds=[fx.Debond(bond(30.0), fx.VCCT(GIc=1e3))],
             effects=[fx.Temperature([(0.0, 0.0), (1.0, -100.0), (2.0, -50.0)])],
-            path=path,
+            solver=solver,
         )
         return scene.run(
             fx.Static(until=fx.Time(2.0), stepping="increment", initial=0.25, maximum=0.25)

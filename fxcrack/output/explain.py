@@ -5,13 +5,13 @@ Nothing is estimated: unknowns and terms are counted, seconds are those of the r
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
+from fxcrack.solvers.newton import NewtonSolver
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
 INTERFACE_LAWS = ("contact", "friction", "softening")
 
@@ -21,8 +21,8 @@ class Explanation:
     """A scene in numbers.
 
     Attributes:
-        path: "condensed" or "newton".
-        why: Reasons for the path.
+        solver: "linear" or "newton".
+        why: Reasons for the solver.
         effects: What is on beyond small linear elasticity.
         unknowns: How many there are, by kind; kinds that the scene lacks are not listed.
         counts: Form terms, compiled forms, factorisations, nonlinear iterations so far.
@@ -30,7 +30,7 @@ class Explanation:
         costs: Seconds of the runs so far, by effect.
     """
 
-    path: str
+    solver: str
     why: tuple[str, ...]
     effects: tuple[str, ...]
     unknowns: dict[str, int]
@@ -38,9 +38,20 @@ class Explanation:
     phases: dict[str, float]
     costs: dict[str, float]
 
+    @property
+    def path(self) -> str:
+        """Former name of :attr:`solver`, deprecated: "condensed" for "linear"."""
+        warnings.warn(
+            "Explanation.path is now called Explanation.solver, with 'linear' for 'condensed'; the "
+            "former name will be removed",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return "condensed" if self.solver == "linear" else self.solver
+
     def __str__(self) -> str:
         """Several lines for a terminal."""
-        lines = [f"path: {self.path}, because {'; '.join(self.why)}"]
+        lines = [f"solver: {self.solver}, because {'; '.join(self.why)}"]
         lines.append("effects: " + ("; ".join(self.effects) or "none beyond linear elasticity"))
         lines.append("unknowns: " + _listed(self.unknowns))
         lines.append("counted: " + _listed(self.counts))
@@ -54,43 +65,38 @@ class Explanation:
         return "\n".join(lines)
 
 
-def explain(scene: Scene) -> Explanation:
-    """Look at a scene; the same on every rank."""
-    model = scene.solver
-    unknowns = {"displacements": scene.continuum.n_global}
-    counts = {"form terms": 1, "factorisations": model.timings.factorizations}
+def explain(source: Analysis | HasAnalysis) -> Explanation:
+    """Look at a scene or its analysis; collective, the same on every rank."""
+    analysis = analysis_of(source)
+    solver = analysis.solver
+    unknowns = {"displacements": analysis.continuum.n_global}
+    counts = {"form terms": 1, "factorisations": solver.timings.factorizations}
     costs: dict[str, float] = {}
-    if model.prepared:
-        system = model.system
-        unknowns["jumps in the window"] = system.n_retained
+    if analysis.started:
+        system = solver.system
+        unknowns["retained jumps"] = system.n_retained
         for kind, number in (
             ("contact nodes", int(system.contact.sum())),
             ("friction nodes", 0 if system.friction is None else len(system.friction.rows)),
-            ("softening bonds", len(system.soft.bonds)),
+            ("cohesive bonds", len(system.soft.bonds)),
         ):
             if number:
                 unknowns[kind] = number
-        costs = {k: v for k, v in model.law_seconds.items() if k in INTERFACE_LAWS}
-    bodies = getattr(model, "bodies", None)
-    if bodies is not None:
+        costs = {k: v for k, v in solver.law_seconds.items() if k in INTERFACE_LAWS}
+    if isinstance(solver, NewtonSolver):
+        bodies = solver.bodies
         kept = sum(np.size(v) for term in bodies.terms for v in term.state().values())
-        kept = int(scene.mesh.comm.allreduce(kept))
+        kept = int(analysis.comm.allreduce(kept))
         if kept:
             unknowns["remembered values"] = kept
         counts["form terms"] = len(bodies.terms)
         counts["compiled forms"] = bodies.n_forms
-        counts["nonlinear solves"] = model.counts.solves  # type: ignore[attr-defined]
-        counts["iterations"] = model.counts.iterations  # type: ignore[attr-defined]
+        counts["nonlinear solves"] = solver.counts.solves
+        counts["iterations"] = solver.counts.iterations
         costs = {**bodies.seconds, **costs}
-    return Explanation(
-        scene.plan.path,
-        scene.plan.why,
-        scene.plan.effects,
-        unknowns,
-        counts,
-        dict(model.timings.seconds),
-        costs,
-    )
+    plan = analysis.plan
+    seconds = dict(solver.timings.seconds)
+    return Explanation(plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs)
 
 
 def _listed(table: dict[str, int]) -> str:

@@ -7,7 +7,6 @@ import shutil
 import tempfile
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import dolfinx.plot
@@ -22,52 +21,52 @@ from fxcrack.history import Row
 from fxcrack.interface.pairing import Pair
 from fxcrack.output.interface_fields import InterfaceFields, in_space, interface_fields
 from fxcrack.output.vtu import FACETS, Grid, write_grid, write_header, write_series
+from fxcrack.solvers.newton import NewtonSolver
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
 
-
-def displacement_function(scene: Scene) -> fem.Function:
-    """Displacement of the present state; collective, one back-solve.
+def displacement_function(source: Analysis | HasAnalysis) -> fem.Function:
+    """Displacement of the present state of a scene or its analysis; collective, one back-solve.
 
     Raises:
         InputError: No step was run yet.
     """
-    if not scene.solver.prepared:
-        raise InputError("the scene has no state yet; run a step before asking for fields")
-    u = fem.Function(scene.continuum.space, name="displacement")
-    vector = scene.solver.displacement()
-    u.x.array[: scene.continuum.n_local] = vector.array
+    analysis = analysis_of(source)
+    analysis.check_started("fields")
+    u = fem.Function(analysis.continuum.space, name="displacement")
+    vector = analysis.solver.displacement()
+    u.x.array[: analysis.continuum.n_local] = vector.array
     vector.destroy()
     u.x.scatter_forward()
     return u
 
 
-def stress_function(scene: Scene, u: fem.Function, time: float) -> fem.Function:
+def stress_function(source: Analysis | HasAnalysis, u: fem.Function, time: float) -> fem.Function:
     """Cauchy stress of the present state, means over the undeformed cells; collective.
 
     Components in the order of ``model.stress_labels``.
 
     Args:
-        scene: The scene, after a step.
+        source: A scene or its analysis, after a step.
         u: Its displacement.
         time: Its time, which tells the temperature.
     """
-    bodies = getattr(scene.solver, "bodies", None)
-    if bodies is not None:
-        return bodies.stress()
-    if scene.continuum.temperature is not None:
-        scene.continuum.temperature.set(time)
-    return cell_stress(scene.continuum, u)
+    analysis = analysis_of(source)
+    if isinstance(analysis.solver, NewtonSolver):
+        return analysis.solver.bodies.stress()
+    continuum = analysis.continuum
+    if continuum.temperature is not None:
+        continuum.temperature.set(time)
+    return cell_stress(continuum, u)
 
 
 # -- grids -----------------------------------------------------------------------------------------
 
 
-def body_grid(scene: Scene, u: fem.Function, time: float) -> Grid:
+def body_grid(analysis: Analysis, u: fem.Function, time: float) -> Grid:
     """This rank's cells with displacement, stress and von Mises stress; collective."""
-    continuum = scene.continuum
-    stress = stress_function(scene, u, time)
+    continuum = analysis.continuum
+    stress = stress_function(analysis, u, time)
     equivalent = von_mises(continuum, stress)
     topology, kinds, x = dolfinx.plot.vtk_mesh(continuum.space)
     width = continuum.space.dofmap.dof_layout.num_dofs
@@ -130,10 +129,10 @@ class FieldSeries:
     was there before stays as it was when a write fails.
 
     Args:
-        scene: The scene.
+        source: A scene or its analysis.
         path: The .pvd file of the bodies.
         events: Events of the history at which the series, called as an observer, writes.
-        every: Write at each so-manieth of them.
+        every: Write at every n-th of them, 1 or more.
 
     Raises:
         InputError: The path does not end in .pvd, or ``every`` is not positive.
@@ -144,7 +143,7 @@ class FieldSeries:
 
     def __init__(
         self,
-        scene: Scene,
+        source: Analysis | HasAnalysis,
         path: str | Path,
         *,
         events: tuple[str, ...] = ("start", "increment", "release"),
@@ -155,13 +154,13 @@ class FieldSeries:
             raise InputError(f"fields are written to a .pvd file, not to '{path}'")
         if every < 1:
             raise InputError(f"FieldSeries: every = {every} must be 1 or more")
-        self._scene = scene
+        self._analysis = analysis_of(source)
         self._events = events
         self._every = every
         self._seen = 0
         self._folder = self.path.with_suffix("")
         self._parts = ["bodies"]
-        for pair in scene.pairs:
+        for pair in self._analysis.pairs:
             name = re.sub(r"[^\w.-]", "_", pair.title)
             self._parts.append(name if name not in self._parts else f"{name}_{len(self._parts)}")
         self._steps: list[list[tuple[float, str]]] = [[] for _ in self._parts]
@@ -194,13 +193,15 @@ class FieldSeries:
         Raises:
             FxcrackError: A file could not be written; the old files are still there.
         """
-        scene, comm = self._scene, self._scene.mesh.comm
-        time = scene.time if time is None else time
-        u = displacement_function(scene)
-        bodies = body_grid(scene, u, time)
+        analysis, comm = self._analysis, self._analysis.comm
+        time = analysis.time if time is None else time
+        u = displacement_function(analysis)
+        bodies = body_grid(analysis, u, time)
         surfaces = [
             interface_grid(pair, fields)
-            for pair, fields in zip(scene.pairs, interface_fields(scene, u, time), strict=True)
+            for pair, fields in zip(
+                analysis.pairs, interface_fields(analysis, u, time), strict=True
+            )
         ]
         task, folder = f"writing fields to '{self.path}'", ""
         with all_or_none(comm, task):
@@ -222,7 +223,7 @@ class FieldSeries:
 
     def _write_pieces(self, folder: Path, bodies: Grid, surfaces: list[Grid]) -> list[str]:
         """Write what this rank has; returns the file name of each part."""
-        comm, number = self._scene.mesh.comm, f"{len(self._steps[0]):05d}"
+        comm, number = self._analysis.comm, f"{len(self._steps[0]):05d}"
         names = [f"{part}_{number}.vtu" for part in self._parts]
         if comm.size > 1:
             pieces = [f"{self._parts[0]}_{number}_r{rank}.vtu" for rank in range(comm.size)]
@@ -258,17 +259,19 @@ class FieldSeries:
                 file.unlink()
 
 
-def write_fields(scene: Scene, path: str | Path, *, time: float | None = None) -> None:
+def write_fields(
+    source: Analysis | HasAnalysis, path: str | Path, *, time: float | None = None
+) -> None:
     """Write the present fields of a scene; collective, one back-solve.
 
     Args:
-        scene: The scene, after a step.
+        source: A scene or its analysis, after a step.
         path: The .pvd file of the bodies; interfaces have files beside it, see
             :class:`FieldSeries`.
-        time: Time to note; that of the scene by default.
+        time: Time in the series; that of the scene by default.
 
     Raises:
         InputError: The path does not end in .pvd, or no step was run yet.
         FxcrackError: A file could not be written; the old ones are still there.
     """
-    FieldSeries(scene, path).write(time)
+    FieldSeries(source, path).write(time)

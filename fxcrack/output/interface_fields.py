@@ -1,7 +1,7 @@
 """Fields on an interface: jumps, bond tractions, state and front, the same on every rank.
 
 Jumps and bond forces are taken from the displacement field, so they are known on the whole
-interface and not only in the window:
+interface and not only among the retained ones:
 
     jump_s = u_s - sum_m W_sm u_m,        r = K u - sum_i lambda_i f_i,        t_s = -f_s / area_s
 
@@ -12,7 +12,6 @@ of the slaves it carries as a master.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import numpy as np
@@ -22,11 +21,8 @@ from dolfinx import fem
 from fxcrack.base.arrays import Array
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.interface.nodes import InterfaceNodes, point_displacements
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 from fxcrack.steps.bond_records import bond_state
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-
 
 _ROUND_OFF = 1e-9
 """Forces below this fraction of the largest bond force count as zero."""
@@ -42,7 +38,7 @@ class InterfaceFields:
         traction: Bond or contact force per tributary area, positive along the normal in tension,
             shape (n_nodes, 3), force/length^2.
         normal: Unit vectors from master to slave, shape (n_nodes, 3).
-        state: 1 bonded, 0.5 letting go (some bond force is left), 0 open, -1 no master beneath,
+        state: 1 bonded, 0.5 being released (some bond force is left), 0 open, -1 no master beneath,
             shape (n_nodes,).
         front: 1 on front nodes, shape (n_nodes,).
         release_time: Time at which a node was released, 0 if it was open from the start, NaN while
@@ -64,13 +60,13 @@ class InterfaceFields:
     bonds: dict[str, Array]
 
 
-def residual(scene: Scene, u: fem.Function) -> Array:
+def residual(analysis: Analysis, u: fem.Function) -> Array:
     """Forces of interfaces and supports on the bodies, K u - f; collective.
 
     Returns:
         Shape (n_local,), the owned dofs of this rank, force.
     """
-    vector = scene.solver.nodal_forces(u.x.petsc_vec)
+    vector = analysis.solver.nodal_forces(u.x.petsc_vec)
     values = np.array(vector.array)
     vector.destroy()
     return values
@@ -82,24 +78,25 @@ def in_space(values: Array) -> Array:
 
 
 def interface_fields(
-    scene: Scene, u: fem.Function, time: float | None = None
+    source: Analysis | HasAnalysis, u: fem.Function, time: float | None = None
 ) -> list[InterfaceFields]:
-    """Fields on every interface of the scene, in the order of ``scene.pairs``; collective.
+    """Fields on every interface of a scene, in the order of ``scene.pairs``; collective.
 
     Args:
-        scene: The scene.
+        source: The scene or its analysis, after a step.
         u: Its displacement, from :func:`displacement_function`.
         time: Time of the present state; that of the scene by default.
     """
-    continuum, pairs = scene.continuum, scene.pairs
+    analysis = analysis_of(source)
+    continuum, pairs = analysis.continuum, analysis.pairs
     nodes, gdim = InterfaceNodes.of_pairs(continuum.layout, pairs), continuum.gdim
     motion = nodes.gather(u.x.array[: continuum.n_local])
-    direct = nodes.gather(residual(scene, u))
+    direct = nodes.gather(residual(analysis, u))
     slaves = [nodes.find(p.surface.dofs) for p in pairs]
     masters = [nodes.find(p.masters) for p in pairs]
     acting = [
-        p.paired & (front.bonded | (index >= 0).any(axis=1))
-        for p, front, index in zip(pairs, scene.solver.fronts, scene.solver.index, strict=True)
+        pair.paired & (front.bonded | analysis.retained_nodes(p))
+        for p, (pair, front) in enumerate(zip(pairs, analysis.solver.fronts, strict=True))
     ]
     total = direct
     for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
@@ -109,22 +106,22 @@ def interface_fields(
         total = direct + carried
     return [
         _fields_of(
-            scene,
+            analysis,
             p,
             point_displacements(motion[slaves[p]], pair.surface.point_maps),
             point_displacements(motion[masters[p]], pair.master_maps),
             np.where(acting[p][:, None], total[slaves[p], :gdim], 0.0),
-            scene.time if time is None else time,
+            analysis.time if time is None else time,
         )
         for p, pair in enumerate(pairs)
     ]
 
 
 def _fields_of(
-    scene: Scene, p: int, slave: Array, masters: Array, force: Array, time: float
+    analysis: Analysis, p: int, slave: Array, masters: Array, force: Array, time: float
 ) -> InterfaceFields:
     """Fields on pair p from the displacements and forces at its nodes."""
-    pair, solver = scene.pairs[p], scene.solver
+    pair, solver = analysis.pairs[p], analysis.solver
     surface = pair.surface
     under = np.einsum("nk,nkc->nc", pair.weights, masters)
     opening = np.where(pair.paired[:, None], slave - under, 0.0)
@@ -133,24 +130,24 @@ def _fields_of(
     local[solver.held_by_supports[p]] = 0.0
     bond = np.einsum("nck,nk->nc", solver.frames[p], local)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
-    bonded, index = solver.fronts[p].bonded, solver.index[p]
-    given = np.append(np.abs(solver.state.force), 0.0)[index]  # outside the window the index is -1
-    largest = np.abs(local).max(initial=0.0)
-    force_ramps = ~bonded & (given > _ROUND_OFF * largest).any(axis=1)
-    state = np.where(bonded, 1.0, np.where(force_ramps, 0.5, 0.0))
+    bonded = solver.fronts[p].bonded
+    given = np.abs(analysis.given_forces_at(p)) > _ROUND_OFF * np.abs(local).max(initial=0.0)
+    state = np.where(bonded, 1.0, np.where(given.any(axis=1), 0.5, 0.0))
     state[~pair.paired] = -1.0
     front = np.zeros(surface.n_nodes, dtype=np.int32)
     when = np.where(bonded, np.nan, 0.0)
     at_front: dict[str, Array] = {}
     bonds: dict[str, Array] = {}
-    for growth in scene.cracks:
-        if growth.p == p:
-            tips = growth.tips()
+    for crack in analysis.cracks:
+        if crack.p == p:
+            tips = crack.tips()
             front[tips.node] = 1
-            for node, moment in growth.released:
+            for node, moment in crack.released:
                 when[node] = moment
-            values = growth.evaluate(tips, solver.state, time) if solver.active[p] else None
-            bonds = bond_state(growth, scene.ramps, values)
+            values = None
+            if crack in analysis.active:
+                values = crack.evaluate(tips, solver.state, time)
+            bonds = bond_state(crack, analysis.ramps, values)
             if values is not None:
                 at_front = _at_front(values, surface.n_nodes)
     return InterfaceFields(

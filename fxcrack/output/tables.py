@@ -9,7 +9,6 @@ from __future__ import annotations
 import csv
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -19,22 +18,28 @@ from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
 from fxcrack.history import Row
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 from fxcrack.steps.bond_records import bond_state
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-    from fxcrack.steps.crack import Crack
+from fxcrack.steps.crack import Crack
 
 
-def bond_rows(scene: Scene, growth: Crack, nodes: Ints, time: float) -> list[Row]:
-    """One row per slave node with position and all the usual names; the same on every rank."""
-    p = growth.p
-    values = growth.evaluate(growth.tips(), scene.solver.state, time)
-    bonds = bond_state(growth, scene.ramps, values if scene.solver.active[p] else None)
+def bond_rows(analysis: Analysis, crack: Crack, nodes: Ints, time: float) -> list[Row]:
+    """One row per slave node with position and all the usual names; the same on every rank.
+
+    Args:
+        analysis: The analysis.
+        crack: One of its cracks.
+        nodes: Slave nodes of its interface, shape (n,).
+        time: Time at which criteria are evaluated.
+    """
+    values = None
+    if crack in analysis.active:
+        values = crack.evaluate(crack.tips(), analysis.solver.state, time)
+    bonds = bond_state(crack, analysis.ramps, values)
     rows = []
     for node in nodes:
-        x, y, z = growth.front.surface.x[node]
-        row: Row = {"interface": growth.title, "node": int(node)}
+        x, y, z = crack.front.surface.x[node]
+        row: Row = {"interface": crack.title, "node": int(node)}
         row |= {"x": float(x), "y": float(y), "z": float(z)}
         for name, field in bonds.items():
             if field.ndim == 1:
@@ -45,21 +50,26 @@ def bond_rows(scene: Scene, growth: Crack, nodes: Ints, time: float) -> list[Row
     return rows
 
 
-def failed(growth: Crack) -> Ints:
-    """Slave nodes that have let go, in that order."""
-    return np.array([record.node for record in growth.records], dtype=np.int64)
+def failed(crack: Crack) -> Ints:
+    """Released slave nodes in the order of their release, shape (n_released,)."""
+    return np.array([record.node for record in crack.records], dtype=np.int64)
 
 
-def bond_table(scene: Scene) -> str:
-    """Every bond that has let go with the usual names, in the order of failure, as text.
+def bond_table(source: Analysis | HasAnalysis) -> str:
+    """Every released bond with the usual names, in the order of failure, as text.
+
+    Args:
+        source: A scene or its analysis, after a step.
 
     Raises:
         InputError: No step was run yet.
     """
+    analysis = analysis_of(source)
+    analysis.check_started("its bonds")
     lines = []
-    for growth in _growths(scene):
-        rows = bond_rows(scene, growth, failed(growth), scene.time)
-        lines.append(f"interface '{growth.title}': {len(rows)} bonds have let go")
+    for crack in analysis.cracks:
+        rows = bond_rows(analysis, crack, failed(crack), analysis.time)
+        lines.append(f"interface '{crack.title}': {len(rows)} bonds released")
         if rows:
             names = [name for name in rows[0] if name != "interface"]
             lines.append("  " + "  ".join(f"{name:>11}" for name in names))
@@ -68,13 +78,13 @@ def bond_table(scene: Scene) -> str:
 
 
 class BondHistory:
-    """Observer that notes the usual names at chosen bonds at every event of a run.
+    """Observer that records the usual names at chosen bonds at every event of a run.
 
     Args:
-        scene: The scene.
+        source: The scene or its analysis.
         interface: Name of the interface.
         where: Which slave nodes: a function of positions of shape (3, n) that returns n booleans;
-            by default those that have let go so far.
+            by default those released so far.
 
     Attributes:
         rows: time, event and the columns of :func:`bond_rows`, the same on every rank.
@@ -85,18 +95,18 @@ class BondHistory:
 
     def __init__(
         self,
-        scene: Scene,
+        source: Analysis | HasAnalysis,
         interface: str,
         where: Callable[[Array], npt.NDArray[np.bool_]] | None = None,
     ) -> None:
-        titles = [debond.interface.title for debond in scene.debonds]
+        self._analysis = analysis_of(source)
+        titles = [debond.interface.title for debond in self._analysis.debonds]
         if interface not in titles:
             unknown_name("debond of interface", interface, titles)
-        self._scene = scene
         self._p = titles.index(interface)
         self._nodes: Ints | None = None
         if where is not None:
-            x = scene.pairs[self._p].surface.x
+            x = self._analysis.pairs[self._p].surface.x
             marks = np.asarray(where(np.ascontiguousarray(x.T)))
             if marks.shape != (len(x),):
                 raise InputError(
@@ -107,19 +117,19 @@ class BondHistory:
         self.rows: list[Row] = []
 
     def __call__(self, event: str, row: Row) -> None:
-        """Note the bonds at an event."""
-        growth = self._scene.cracks[self._p]
-        nodes = failed(growth) if self._nodes is None else self._nodes
-        for bond in bond_rows(self._scene, growth, nodes, float(row["time"])):
+        """Record the bonds at an event."""
+        crack = self._analysis.cracks[self._p]
+        nodes = failed(crack) if self._nodes is None else self._nodes
+        for bond in bond_rows(self._analysis, crack, nodes, float(row["time"])):
             self.rows.append({"time": row["time"], "event": event, **bond})
 
     def to_csv(self, path: str | Path) -> None:
         """Write all rows as comma-separated values; collective, rank 0 writes."""
-        write_rows(self._scene, path, self.rows)
+        write_rows(self._analysis, path, self.rows)
 
 
-def write_releases(scene: Scene, path: str | Path) -> None:
-    """Write every bond that has let go as comma-separated values; collective, rank 0 writes.
+def write_releases(source: Analysis | HasAnalysis, path: str | Path) -> None:
+    """Write every released bond as comma-separated values; collective, rank 0 writes.
 
     Columns: those of :func:`bond_rows`.
 
@@ -127,14 +137,16 @@ def write_releases(scene: Scene, path: str | Path) -> None:
         InputError: No step was run yet.
         FxcrackError: The file could not be written.
     """
-    cracks = _growths(scene)
-    rows = [row for g in cracks for row in bond_rows(scene, g, failed(g), scene.time)]
-    write_rows(scene, path, rows)
+    analysis = analysis_of(source)
+    analysis.check_started("its bonds")
+    time = analysis.time
+    rows = [row for g in analysis.cracks for row in bond_rows(analysis, g, failed(g), time)]
+    write_rows(analysis, path, rows)
 
 
-def write_rows(scene: Scene, path: str | Path, rows: list[Row]) -> None:
+def write_rows(analysis: Analysis, path: str | Path, rows: list[Row]) -> None:
     """Write rows of the same columns; collective, rank 0 writes."""
-    comm = scene.mesh.comm
+    comm = analysis.comm
     with all_or_none(comm, f"writing {path}"):
         if comm.rank == 0:
             with replacing(path) as temporary, temporary.open("w", newline="") as stream:
@@ -143,38 +155,29 @@ def write_rows(scene: Scene, path: str | Path, rows: list[Row]) -> None:
                 writer.writerows(rows)
 
 
-def _growths(scene: Scene) -> list[Crack]:
-    if not scene.solver.prepared:
-        raise InputError("the scene has no state yet; run a step before asking for its bonds")
-    return scene.cracks
-
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-
-
-def tip_table(scene: Scene) -> str:
+def tip_table(source: Analysis | HasAnalysis) -> str:
     """Crack tip location and associated quantities, as text.
 
     Per interface and tip: crack number, initial tip, current tip, length grown between them along
     the slave surface, f and the quantities of the criterion.
     """
+    analysis = analysis_of(source)
     lines = []
-    for crack, g in enumerate(scene.cracks, start=1):
+    for number, g in enumerate(analysis.cracks, start=1):
         interface = g.debond.interface
         lines.append(
-            f"crack {crack}: slave '{interface.slave}', master '{interface.master}', "
+            f"crack {number}: slave '{interface.slave}', master '{interface.master}', "
             f"{type(g.criterion).__name__}, {g.n_released} nodes released, "
             f"open area {g.extent.area(g.tips()):.6g}"
         )
-        values = g.evaluate(g.tips(), scene.solver.state, scene.time)
+        values = g.evaluate(g.tips(), analysis.solver.state, analysis.time)
         origins = g.paths.origins(values.tips)
         names = list(values.report)
         head = ["current tip", "position", "initial tip", "growth", "f", *names]
         lines.append("  " + "  ".join(f"{h:>12}" for h in head))
         for i, node in enumerate(values.tips.node):
             first, growth = int(origins.nearest[i]), origins.grown[i]
-            x = ", ".join(f"{c:.5g}" for c in g.front.surface.x[node, : scene.mesh.gdim])
+            x = ", ".join(f"{c:.5g}" for c in g.front.surface.x[node, : analysis.mesh.gdim])
             cells = [f"{int(node)}", f"({x})", f"{first}", f"{growth:.5g}", f"{values.f[i]:.5g}"]
             cells += [f"{values.report[name][i]:.5g}" for name in names]
             lines.append("  " + "  ".join(f"{c:>12}" for c in cells))
@@ -183,10 +186,10 @@ def tip_table(scene: Scene) -> str:
     return "\n".join(lines) + "\n"
 
 
-def write_tip_table(scene: Scene, path: str | Path) -> None:
+def write_tip_table(source: Analysis | HasAnalysis, path: str | Path) -> None:
     """Write :func:`tip_table`; collective."""
-    text = tip_table(scene)
-    with all_or_none(scene.mesh.comm, f"writing {path}"):
-        if scene.mesh.comm.rank == 0:
+    text, comm = tip_table(source), analysis_of(source).comm
+    with all_or_none(comm, f"writing {path}"):
+        if comm.rank == 0:
             with replacing(path) as temporary:
                 temporary.write_text(text)

@@ -9,15 +9,13 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from fxcrack.interface.pairing import Interface
 from fxcrack.mesh import Mesh
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
+from fxcrack.steps.analysis import Analysis
 
 _SAME = 1e-9
 """Numbers closer than this fraction are the same: sums over ranks differ by round-off."""
@@ -25,42 +23,42 @@ _SHOWN = 5
 _LONG = 12
 
 
-def fingerprint(scene: Scene, step: Any, grow: list[bool]) -> dict[str, Any]:
+def fingerprint(analysis: Analysis, step: Any, grow: list[bool]) -> dict[str, Any]:
     """Everything the history of a step depends on; collective.
 
     Args:
-        scene: The scene, with its cracks.
+        analysis: The analysis, with its cracks.
         step: The step.
         grow: Which debonds may grow.
     """
-    continuum = scene.continuum
+    continuum, solver = analysis.continuum, analysis.solver
     interfaces: dict[str, Any] = {}
-    for p, pair in enumerate(scene.pairs):
+    for p, pair in enumerate(analysis.pairs):
         parts: dict[str, Any] = {
             **plain({f.name: getattr(pair.interface, f.name) for f in _fields(pair.interface)}),
             "nodes": plain(pair.surface.x),
             "bonded": plain(pair.bonded),
             "gap": plain(pair.gap),
         }
-        if p < len(scene.cracks):
-            growth = scene.cracks[p]
-            debond = growth.debond
+        if p < len(analysis.cracks):
+            crack = analysis.cracks[p]
+            debond = crack.debond
             parts["criterion"] = plain(debond.criterion)
-            parts["toughness"] = plain(getattr(growth.evaluator, "toughness", None))
+            parts["toughness"] = plain(getattr(crack.evaluator, "toughness", None))
             parts["release"] = plain(debond.release)
             parts["watch"] = plain(list(debond.watch))
             parts["grows"] = grow[p]
         interfaces[pair.title] = parts
     return {
-        "mesh": _mesh(scene.mesh),
+        "mesh": _mesh(analysis.mesh),
         "order": continuum.order,
         "materials": plain(continuum.part_materials),
         "model": plain(continuum.model),
-        "path": scene.plan.path,
-        "effects": plain(scene.effects),
-        "supports": [plain(c.support) for c in scene.supports.columns],
-        "loads": plain(scene.loads),
-        "monitors": plain(scene.solver.monitors),
+        "solver": analysis.plan.solver,
+        "effects": plain(analysis.effects),
+        "supports": [plain(c.support) for c in solver.supports.columns],
+        "loads": plain(solver.loads),
+        "monitors": plain(solver.monitors),
         "interfaces": interfaces,
         "step": plain(step),
     }

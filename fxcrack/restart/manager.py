@@ -1,6 +1,6 @@
-"""What survives when a job ends early: checkpoints, the history on disk, an orderly stop.
+"""What is left when a job ends early: checkpoints, the history on disk, an orderly stop.
 
-A step rests between two increments or releases. There all ranks agree, by one small reduction,
+Between two increments or releases nothing is half done. There all ranks agree, by one reduction,
 whether a checkpoint is due, a file could not be written, or a signal asks to stop.
 """
 
@@ -10,9 +10,10 @@ import importlib.metadata
 import time
 import uuid
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -24,17 +25,15 @@ from fxcrack.restart.checkpoint import Checkpoint, Saved, next_of_folder, read, 
 from fxcrack.restart.fingerprint import differences, fingerprint, summary
 from fxcrack.restart.history_file import HistoryFile
 from fxcrack.restart.scene_state import apply_after_condensation, apply_before_condensation, collect
-from fxcrack.steps.driver import StepDriver
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
+from fxcrack.steps.analysis import Analysis
 
 
 class RestartManager:
-    """Keeps one step of a scene; a context manager around its march.
+    """Saves one step of an analysis and resumes it; a context manager around its run.
 
     Args:
-        scene: The scene, with its cracks; not yet prepared for the step.
+        analysis: The analysis, with its cracks; not yet prepared for the step.
+        files: What the steps of the scene share.
         step: The step.
         grow: Which debonds may grow.
         checkpoint: Where the state goes, if anywhere.
@@ -42,8 +41,7 @@ class RestartManager:
         save: Where the history goes while the step runs, if anywhere.
 
     Attributes:
-        wanted: Whether there is anything to keep; without, nothing is done at all.
-        resume: Books to go on from, ``None`` if the step begins.
+        progress: Progress of the step to go on from, ``None`` if it begins.
         finished: Why the step ended, if the checkpoint is that of its end; else empty.
 
     Raises:
@@ -52,7 +50,8 @@ class RestartManager:
 
     def __init__(
         self,
-        scene: Scene,
+        analysis: Analysis,
+        files: RunFiles,
         step: Any,
         grow: list[bool],
         *,
@@ -64,19 +63,20 @@ class RestartManager:
             raise InputError(
                 "restart=True needs checkpoint=fx.Checkpoint(path): where to go on from"
             )
-        self._scene = scene
-        self._comm = scene.mesh.comm
+        self._analysis = analysis
+        self._files = files
+        self._comm = analysis.comm
         self._checkpoint = checkpoint
-        self._file = None if save is None else HistoryFile(scene.history, save)
+        self._file = None if save is None else HistoryFile(analysis.history, save)
         self._listener = Listener()
         self._stack = ExitStack()
         self._count, self._last = 0, time.monotonic()
         self._print: dict[str, Any] = {}
         self._saved: Saved | None = None
-        self.resume: dict[str, Any] | None = None
+        self.progress: dict[str, Any] | None = None
         self.finished = ""
         if checkpoint is not None:
-            self._print = fingerprint(scene, step, grow)
+            self._print = fingerprint(analysis, step, grow)
             if restart:
                 self._open(checkpoint)
         if self.finished and self._file is not None:
@@ -88,13 +88,13 @@ class RestartManager:
         return self._checkpoint is not None or self._file is not None
 
     def _open(self, checkpoint: Checkpoint) -> None:
-        """Read the checkpoint of the step and put the scene into its state."""
-        scene, path = self._scene, checkpoint.file(self._scene.steps)
+        """Read the checkpoint of the step and put the analysis into its state."""
+        files, path = self._files, checkpoint.file(self._files.steps)
         saved = read(self._comm, path)
         if saved is None:
             log.warn("no checkpoint %s to go on from: the step begins at its beginning", path)
             return
-        if scene.steps > 1 and saved.about["run"] != scene.run_id:
+        if files.steps > 1 and saved.about["run"] != files.run_id:
             log.warn("checkpoint %s is of another run: the step begins at its beginning", path)
             return
         found = differences(saved.about["scene"], self._print)
@@ -103,17 +103,22 @@ class RestartManager:
                 f"checkpoint {path} belongs to another scene: {summary(found)}. Run without "
                 "restart, or mend the scene"
             )
-        scene.run_id = saved.about["run"]
-        apply_before_condensation(scene, saved)
+        files.run_id = saved.about["run"]
+        apply_before_condensation(self._analysis, saved)
         self._saved = saved
-        self.resume = saved.about["books"]
+        self.progress = saved.about["progress"]
         self.finished = saved.about["finished"]
-        log.info("going on from %s, time %g", path, saved.about["books"]["time"])
+        log.info("going on from %s, time %g", path, self._analysis.time)
+
+    @property
+    def resumes(self) -> bool:
+        """Whether the step goes on from a checkpoint."""
+        return self.progress is not None
 
     def put_in_equilibrium(self) -> None:
-        """Find the saved equilibrium in the window of the scene."""
+        """Find the saved equilibrium on the retained jumps."""
         assert self._saved is not None
-        apply_after_condensation(self._scene, self._saved)
+        apply_after_condensation(self._analysis, self._saved)
         self._saved = None
 
     def __enter__(self) -> RestartManager:
@@ -131,8 +136,11 @@ class RestartManager:
         """Give signals back."""
         self._stack.close()
 
-    def checkpoint_point(self, march: StepDriver) -> None:
+    def checkpoint_point(self, progress: dict[str, Any]) -> None:
         """Save what is due, stop if a signal came; collective.
+
+        Args:
+            progress: What the step needs to go on from here, plain values.
 
         Raises:
             Interrupted: A signal came on some rank.
@@ -146,16 +154,16 @@ class RestartManager:
         if failed:
             raise_on_all_ranks(self._comm, problem, FxcrackError)
         if signum:
-            raise Interrupted(signum, self._keep_all(march))
+            raise Interrupted(signum, self._save_all(progress))
         if due:
-            self._save(march, "")
+            self._save(progress, "")
 
-    def finish(self, march: StepDriver, reason: str) -> None:
+    def finish(self, reason: str) -> None:
         """Save the end of the step; collective."""
         if self._file is not None:
             raise_on_all_ranks(self._comm, self._file.update(last=True), FxcrackError)
         if self._checkpoint is not None:
-            self._save(march, reason)
+            self._save({}, reason)
 
     def _due(self) -> bool:
         """Whether a checkpoint is due, as rank 0 sees it."""
@@ -166,46 +174,67 @@ class RestartManager:
         by_count = checkpoint.every is not None and (self._count - 1) % checkpoint.every == 0
         return by_count or time.monotonic() >= self._last + checkpoint.seconds
 
-    def _save(self, march: StepDriver, reason: str) -> None:
-        scene = self._scene
+    def _save(self, progress: dict[str, Any], reason: str) -> None:
         assert self._checkpoint is not None
-        saved = collect(scene, march.carried())
-        version = importlib.metadata.version("fxcrack")
-        about = {"fxcrack": version, "run": scene.run_id, "finished": reason, "scene": self._print}
+        saved = collect(self._analysis)
+        about = {
+            "fxcrack": importlib.metadata.version("fxcrack"),
+            "run": self._files.run_id,
+            "finished": reason,
+            "scene": self._print,
+            "progress": progress,
+        }
         saved.about = {**about, **saved.about}
-        write(self._comm, self._checkpoint.file(scene.steps), saved)
+        write(self._comm, self._checkpoint.file(self._files.steps), saved)
         self._last = time.monotonic()
 
-    def _keep_all(self, march: StepDriver) -> str:
+    def _save_all(self, progress: dict[str, Any]) -> str:
         """Save everything; says what and where."""
         kept = []
         if self._file is not None:
             raise_on_all_ranks(self._comm, self._file.update(last=True), FxcrackError)
             kept.append(f"history in {self._file.path}")
         if self._checkpoint is not None:
-            self._save(march, "")
-            kept.append(f"restart goes on from {self._checkpoint.file(self._scene.steps)}")
+            self._save(progress, "")
+            kept.append(f"restart goes on from {self._checkpoint.file(self._files.steps)}")
         return ", ".join(kept)
 
 
-def restart_manager(
-    scene: Scene,
-    step: Any,
-    grow: list[bool],
-    checkpoint: Checkpoint | None,
-    restart: bool,
-    save: str | Path | None,
-) -> RestartManager:
-    """The keeper of the next step of a scene; collective.
+@dataclass
+class RunFiles:
+    """The run of a scene, and the files of its steps where they are not given step by step.
 
-    Arguments as for :class:`RestartManager`. Without a checkpoint of its own, a scene takes that of
-    :func:`fxcrack.restart.checkpoint.checkpoints`.
+    Attributes:
+        steps: Number of steps begun.
+        run_id: Tells this run from others that write to the same files.
+        default: Checkpoint, history file and restart for all steps, if there are such.
     """
-    scene.steps += 1
-    if scene.steps == 1:
-        scene.run_id = scene.mesh.comm.bcast(uuid.uuid4().hex)
-        scene.kept = next_of_folder()
-    if checkpoint is None and scene.kept is not None:
-        checkpoint, path, restart = scene.kept
-        save = save or path
-    return RestartManager(scene, step, grow, checkpoint=checkpoint, restart=restart, save=save)
+
+    steps: int = 0
+    run_id: str = ""
+    default: tuple[Checkpoint, Path, bool] | None = None
+
+    def manager(
+        self,
+        analysis: Analysis,
+        step: Any,
+        grow: list[bool],
+        checkpoint: Checkpoint | None,
+        restart: bool,
+        save: str | Path | None,
+    ) -> RestartManager:
+        """The restart manager of the next step; collective.
+
+        Arguments as for :class:`RestartManager`. Without a checkpoint of its own, a step takes that
+        of :func:`fxcrack.restart.checkpoint.checkpoints`.
+        """
+        self.steps += 1
+        if self.steps == 1:
+            self.run_id = analysis.comm.bcast(uuid.uuid4().hex)
+            self.default = next_of_folder()
+        if checkpoint is None and self.default is not None:
+            checkpoint, path, restart = self.default
+            save = save or path
+        return RestartManager(
+            analysis, self, step, grow, checkpoint=checkpoint, restart=restart, save=save
+        )

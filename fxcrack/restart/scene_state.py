@@ -1,4 +1,4 @@
-"""The state of a scene between two increments or releases, as plain values and arrays.
+"""The state of an analysis between two increments or releases, as plain values and arrays.
 
 Everything the rest of the history depends on: interfaces, bonds that are released with time,
 records of releases, fatigue, energies, counters, and the history itself. All of it is the same on
@@ -8,58 +8,52 @@ every rank.
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 import numpy as np
 
 from fxcrack.base.errors import InputError
 from fxcrack.restart.checkpoint import Arrays, Saved
 from fxcrack.solvers.base import Solver
+from fxcrack.steps.analysis import Analysis, EnergyBalance
 from fxcrack.steps.bond_records import ReleaseRecord
+from fxcrack.steps.crack import Crack
 from fxcrack.steps.force_ramps import ForceRamp
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-    from fxcrack.steps.crack import Crack
 
 _SAME = 1e-9
 """Loads are numbers of the input: they differ by round-off or by far more."""
 
 
-def collect(scene: Scene, books: dict[str, Any]) -> Saved:
-    """State of a scene; collective.
-
-    Args:
-        scene: The scene.
-        books: Counters and energies of the step at rest.
-    """
-    fatigue = scene.fatigue
-    arrays = scene.solver.collect()
-    for g in scene.cracks:
+def collect(analysis: Analysis) -> Saved:
+    """State of an analysis; collective."""
+    fatigue = analysis.fatigue
+    arrays = analysis.solver.collect()
+    for g in analysis.cracks:
         arrays |= _collect_records(g)
-    for i, ramp in enumerate(scene.ramps):
+    for i, ramp in enumerate(analysis.ramps):
         arrays |= _ramp_arrays(i, ramp)
     for p in fatigue.waiting:
         arrays[f"fatigue.waiting[{p}]"] = fatigue.waiting[p]
         arrays[f"fatigue.credit[{p}]"] = fatigue.credit[p]
     about = {
-        "books": books,
-        "ramps": [_ramp(r) for r in scene.ramps],
+        "balance": analysis.balance.asdict(),
+        "ramps": [_ramp(r) for r in analysis.ramps],
         "fatigue": {"N": fatigue.N, "pairs": list(fatigue.waiting), "table": fatigue.table},
-        "rows": scene.history.rows,
+        "rows": analysis.history.rows,
     }
     return Saved(about, arrays)
 
 
-def apply_before_condensation(scene: Scene, saved: Saved) -> None:
-    """Put a new scene into a saved state, up to what needs its retained jumps."""
+def apply_before_condensation(analysis: Analysis, saved: Saved) -> None:
+    """Put a new analysis into a saved state, up to what needs its retained jumps."""
     about, arrays = saved.about, saved.arrays
-    scene.history.rows[:] = about["rows"]
-    scene.ramps[:] = [_ramp_of(scene, i, r, arrays) for i, r in enumerate(about["ramps"])]
-    scene.solver.resume(arrays, about["books"]["time"])
-    for g in scene.cracks:
+    analysis.balance = EnergyBalance(**about["balance"])
+    analysis.history.rows[:] = about["rows"]
+    analysis.ramps = [_ramp_of(analysis, i, r, arrays) for i, r in enumerate(about["ramps"])]
+    analysis.solver.resume(arrays, analysis.time)
+    for g in analysis.cracks:
         _apply_records(g, arrays)
-    fatigue, known = scene.fatigue, about["fatigue"]
+    fatigue, known = analysis.fatigue, about["fatigue"]
     fatigue.N = known["N"]
     fatigue.table = known["table"]
     for p in known["pairs"]:
@@ -67,21 +61,20 @@ def apply_before_condensation(scene: Scene, saved: Saved) -> None:
         fatigue.credit[p] = np.asarray(arrays[f"fatigue.credit[{p}]"], dtype=float)
 
 
-def apply_after_condensation(scene: Scene, saved: Saved) -> None:
-    """Check the equilibrium of a scene whose retained jumps are chosen.
+def apply_after_condensation(analysis: Analysis, saved: Saved) -> None:
+    """Check the equilibrium of an analysis whose retained jumps are chosen.
 
     Raises:
         InputError: Loads or jumps are not those that were saved.
     """
-    books = saved.about["books"]
-    before, now = saved.arrays["loads"].astype(float), scene.loads_at(books["time"])
+    before, now = saved.arrays["loads"].astype(float), analysis.loads_at(analysis.time)
     if not np.allclose(before, now, rtol=_SAME, atol=_SAME * np.abs(before).max(initial=0.0)):
         raise InputError(
-            f"the checkpoint does not fit: at time {books['time']:g} amplitudes and load factors "
+            f"the checkpoint does not fit: at time {analysis.time:g} amplitudes and load factors "
             f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or mend the "
             "scene"
         )
-    _check_jumps(scene.solver, saved.arrays)
+    _check_jumps(analysis.solver, saved.arrays)
 
 
 def _collect_records(growth: Crack) -> Arrays:
@@ -118,14 +111,14 @@ def _ramp_arrays(i: int, ramp: ForceRamp) -> Arrays:
     return {f"ramp.{k}[{i}]": v for k, v in values.items() if isinstance(v, np.ndarray)}
 
 
-def _ramp_of(scene: Scene, i: int, known: dict[str, Any], arrays: Arrays) -> ForceRamp:
+def _ramp_of(analysis: Analysis, i: int, known: dict[str, Any], arrays: Arrays) -> ForceRamp:
     kind = next(k for k in get_args(ForceRamp) if k.__name__ == known["kind"])
     values: dict[str, Any] = {k: v for k, v in known.items() if k != "kind"}
     for f in fields(kind):
         if f"ramp.{f.name}[{i}]" in arrays:
             values[f.name] = arrays[f"ramp.{f.name}[{i}]"]
         elif f.name == "law":
-            values["law"] = scene.cracks[known["p"]].debond.release
+            values["law"] = analysis.cracks[known["p"]].debond.release
     ramp: ForceRamp = kind(**values)
     return ramp
 

@@ -42,7 +42,7 @@ class FatigueState:
         credit: Per pair, growth within the element of each slave node, shape (n_nodes,), length.
         table: One entry per tip and stabilised cycle in each column: N and the crack length at
             its beginning (of the tip in 2-D, the mean of the front in 3-D), what the cycle says
-            there, and whether the tip was let go at its end.
+            there, and whether the tip was released at its end.
     """
 
     N: float = 0.0
@@ -53,13 +53,13 @@ class FatigueState:
     )
 
     def meet(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
-        """See a front; the nodes of the first one seen on a pair wait for onset."""
+        """Take notice of a front; the nodes of the first one on a pair wait for onset."""
         if p not in self.waiting:
             self.waiting[p] = np.zeros(n_nodes, dtype=np.bool_)
             self.waiting[p][front] = True
             self.credit[p] = np.zeros(n_nodes)
 
-    def note(
+    def tabulate(
         self,
         N: float,
         interface: str,

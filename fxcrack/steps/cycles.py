@@ -38,8 +38,9 @@ class Cycles:
     piece without a change of contact they follow from its two ends exactly; other pieces are
     halved until they are known to ``change`` of G_max.
 
-    Bonds let go at the maximum of the cycle (with ``period`` at its corner of largest f), where
-    the step ends, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any more.
+    Bonds are released at the maximum of the cycle (with ``period`` at its corner of largest f);
+    the step ends there, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any
+    more.
 
     Args:
         maximum: Time of the largest loads.

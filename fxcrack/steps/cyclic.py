@@ -1,4 +1,4 @@
-"""Marching through cycles: solve one, jump over those that are like it, let go, solve the next.
+"""Steps of load cycles: solve one, jump over those that are like it, release, solve the next.
 
 At each tip the total rate G takes its extremes on the way of the loads through the cycle. Between
 two equilibria without a change of contact, forces and openings are linear in the fraction x of the
@@ -13,8 +13,8 @@ next release is then a closed form (:func:`fxcrack.criteria.cycle_jump`), over a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, cast
 
@@ -22,18 +22,21 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array
 from fxcrack.criteria import CycleJump, Fatigue, Paris, Regime, cycle_jump, total
 from fxcrack.criteria.energy_release import RateEvaluator
-from fxcrack.criteria.evaluator import TipValues, repeat_tips
+from fxcrack.criteria.evaluator import repeat_tips
 from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.history import History
+from fxcrack.history import Row
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.base import Solver
+from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
-from fxcrack.steps.cycle_state import FatigueState, TipCycle
+from fxcrack.steps.cycle_state import TipCycle
 from fxcrack.steps.cycles import Cycles
-from fxcrack.steps.quasi_static import QuasiStaticDriver
+from fxcrack.steps.driver import StepDriver
+from fxcrack.steps.load_path import LoadPath
+from fxcrack.steps.release import release_tips
+from fxcrack.steps.rows import load_columns
 from fxcrack.steps.static import Static
 
 _GRID = np.linspace(0.0, 1.0, 5)
@@ -43,126 +46,129 @@ _SETTLING = 20
 """Cycles that friction gets to settle."""
 
 
-class CyclicDriver(QuasiStaticDriver):
-    """One step of cycles on a condensed model.
+def run_cycles(analysis: Analysis, step: Cycles, **controls: Any) -> str:
+    """Run a step of load cycles on linear bodies; collective.
+
+    Rows of the history: "cycle" for the first stabilised cycle; "release", or "unstable" beyond the
+    upper limit, after each release with the cycle that follows; "arrest" or "limit". They have the
+    columns N, and G_max, dG and da/dN at the tip of largest f.
 
     Args:
-        solver: Model with its present state; prepared for the step.
-        cracks: Activated debonds, all with a :class:`Fatigue` criterion.
-        step: Controls.
-        history: Where rows go: "cycle" for the first stabilised cycle; "release", or "unstable"
-            beyond the upper limit, after each release with the cycle that follows; "arrest" or
-            "limit". They have the columns N, and G_max, dG and da/dN at the tip of largest f.
-        loads_at: Amplitudes and load factors at a time, shape (n_loads,).
-        breaks: Times at which an amplitude changes its slope.
-        fatigue: What earlier cycles left behind; continued.
-        **carried: As for :class:`QuasiStaticDriver`.
+        analysis: The analysis, prepared for the step; all active cracks have a :class:`Fatigue`
+            criterion.
+        step: The cycle and the end conditions.
+        **controls: Observer, checkpoints and resumption, as for
+            :class:`~fxcrack.steps.driver.StepDriver`.
+
+    Returns:
+        Why the step ended.
+
+    Raises:
+        InputError: An amplitude is not cyclic, or no load changes.
+    """
+    cycling = _Cycling(analysis, step)
+    driver = StepDriver(analysis, Static(until=step.until), columns=cycling.columns, **controls)
+    return driver.run(cycling.step)
+
+
+class _Cycling:
+    """The cycles of one step.
+
+    Args:
+        analysis: The analysis.
+        cycles: What the cycle is.
     """
 
-    def __init__(
-        self,
-        solver: Solver,
-        cracks: list[Crack],
-        step: Cycles,
-        history: History,
-        loads_at: Callable[[float], Array],
-        breaks: tuple[float, ...],
-        *,
-        fatigue: FatigueState,
-        **carried: Any,
-    ) -> None:
-        static = Static(until=step.until)
-        super().__init__(solver, cracks, static, history, loads_at, breaks, **carried)
-        self.cycles = step
-        self.fatigue = fatigue
-        self._limit = fatigue.N + step.n_max
+    def __init__(self, analysis: Analysis, cycles: Cycles) -> None:
+        self._analysis = analysis
+        self._cycles = cycles
+        self._limit = analysis.fatigue.N + cycles.n_max
         self._seen: list[TipCycle] = []
-        self._event = "cycle"
-        self._top = 0
-        names = [load if moves else answer for load, answer, moves in self._names]
-        self._corners = step.corners(loads_at, breaks, names)
+        columns = load_columns(analysis.solver)
+        names = [load if moves else answer for load, answer, moves in columns]
+        self._corners = cycles.corners(analysis.loads_at, analysis.load_breaks(), names)
 
-    def carried(self) -> dict[str, Any]:
-        """Energies and counters, and where in the cycles."""
-        cycles = {"event": self._event, "top": self._top, "limit": self._limit}
-        return {**super().carried(), **cycles}
-
-    def _run_events(self) -> str:
-        if self._resume is None:
-            self._go_to_maximum()
+    def step(self, driver: StepDriver) -> str:
+        """Solve a cycle, jump, release, until an end condition holds; why the step ended."""
+        fatigue, event, resume = self._analysis.fatigue, "cycle", driver.resume
+        if resume is None:
+            top = self._go_to_maximum(driver.path)
         else:
-            self._event, self._limit = self._resume["event"], self._resume["limit"]
-            self._begin_at(self._resume["top"])
+            top, event, self._limit = resume["top"], resume["event"], resume["limit"]
+            self._begin_at(top)
         while True:
-            self._at_checkpoint_point()
+            driver.checkpoint_point(event=event, top=top, limit=self._limit)
             self._seen = self._stabilised_cycle()
-            self._record(self._event)
-            reason = self._ended()
+            driver.record(event)
+            reason = driver.ended()
             if reason:
                 return reason
             jump = self._jump()
             if jump.event in ("arrest", "limit"):
-                self._record(jump.event)
+                driver.record(jump.event)
                 if jump.event == "limit":
-                    return f"{self.cycles.n_max:g} cycles done"
+                    return f"{self._cycles.n_max:g} cycles done"
                 return "arrest: no tip grows, however many cycles follow"
-            self._event = "unstable" if jump.event == "unstable" else "release"
-            self._let_go_after(jump)
+            event = "unstable" if jump.event == "unstable" else "release"
+            self._seen = []
+            self._release(jump, fatigue.N)
 
-    def _record(self, event: str) -> None:
-        super()._record(event)
-        row = self.history.rows[-1]
-        row["N"] = self.fatigue.N
-        for g, v, cycle in zip(self.cracks, self._values, self._seen, strict=False):
+    def columns(self) -> Row:
+        """Number of cycles, and what the present cycle does at the tips of largest f."""
+        row: Row = {"N": self._analysis.fatigue.N}
+        for (g, v), cycle in zip(self._analysis.at_tips(), self._seen, strict=False):
             if len(v.tips):
                 for name in ("G_max", "dG", "dadN"):
                     row[f"{name}[{g.title}]"] = float(getattr(cycle, name)[v.largest])
+        return row
 
     # -- one cycle -----------------------------------------------------------------------
 
-    def _go_to_maximum(self) -> None:
-        """Load to the maximum of the cycle; nothing grows on the way."""
-        corners = self._corners
-        if self.cycles.period is not None:
-            largest = []
-            for time, _ in corners:
-                self._load_to(time)
-                largest.append(max(self._largest()))
-            self._begin_at(int(np.argmax(largest)))
-        self._load_to(self._corners[0][0])
-        for g, v in zip(self.cracks, self._values, strict=True):
-            self.fatigue.meet(g.p, v.tips.node, g.front.surface.n_nodes)
+    def _go_to_maximum(self, path: LoadPath) -> int:
+        """Load to the maximum of the cycle, nothing grows on the way; number of its corner."""
+        analysis, top = self._analysis, 0
+        if self._cycles.period is not None:
+            found = []
+            for time, _ in self._corners:
+                self._load_to(path, time)
+                found.append(analysis.largest)
+            top = int(np.argmax(found))
+            self._begin_at(top)
+        self._load_to(path, self._corners[0][0])
+        for g, v in analysis.at_tips():
+            analysis.fatigue.meet(g.p, v.tips.node, g.front.surface.n_nodes)
+        return top
 
     def _begin_at(self, top: int) -> None:
-        """Count the corners of the cycle from one of them."""
-        self._top = top
+        """Begin the cycle at one of its corners."""
         self._corners = self._corners[top:] + self._corners[:top]
 
-    def _load_to(self, time: float) -> None:
-        self._follow(self._pieces(time), time)
-        self._values = self._evaluate()
+    def _load_to(self, path: LoadPath, time: float) -> None:
+        path.over_increment(time)
+        self._analysis.evaluate_tips()
 
     def _stabilised_cycle(self) -> list[TipCycle]:
         """What the cycle does at the tips of each interface; the state stays at the maximum."""
-        system = self.solver.system
+        system = self._analysis.solver.system
         ends = [loads for _, loads in self._corners[1:]]
         if len(ends) > 1 or system.friction is not None:
             ends.append(self._corners[0][1])
-        saved = self.solver.interface_state()
-        corners, largest = self._once(self._instant(self.solver.state), ends)
+        saved = self._analysis.solver.interface_state()
+        corners, largest = self._once(self._instant(self._analysis.solver.state), ends)
         if system.friction is not None:
             # slips settle over some cycles
             for _ in range(_SETTLING):
                 before = largest
                 corners, largest = self._once(corners[-1], ends)
-                if np.all(np.abs(largest - before) <= self.cycles.change * largest):
+                if np.all(np.abs(largest - before) <= self._cycles.change * largest):
                     break
             else:
-                log.warn("friction does not settle in the cycle at N = %g", self.fatigue.N)
+                N = self._analysis.fatigue.N
+                log.warn("friction does not settle in the cycle at N = %g", N)
         way = corners[:1]
         for a, b in pairwise(corners):
             way += self._between(a, b, largest, _HALVINGS)
-        self.solver.restore_interfaces(saved)
+        self._analysis.solver.restore_interfaces(saved)
         return self._extremes(way)
 
     def _once(self, start: _Instant, ends: list[Array]) -> tuple[list[_Instant], Array]:
@@ -173,17 +179,19 @@ class CyclicDriver(QuasiStaticDriver):
         return corners, np.stack([self._totals(c.measured) for c in corners]).max(axis=0)
 
     def _instant(self, state: Equilibrium, *, straight: bool = False) -> _Instant:
+        time, none = self._analysis.time, np.zeros((0, 0))
         measured = [
-            g.evaluator.measure(v.tips, state, self.time) if len(v.tips) else np.zeros((0, 0))
-            for g, v in zip(self.cracks, self._values, strict=True)
+            g.evaluator.measure(v.tips, state, time) if len(v.tips) else none
+            for g, v in self._analysis.at_tips()
         ]
-        return _Instant(state, measured, self.solver.system.closed.tobytes(), straight)
+        return _Instant(state, measured, self._analysis.solver.system.closed.tobytes(), straight)
 
     def _way_to(self, start: Equilibrium, loads: Array) -> list[_Instant]:
         """Instants from an equilibrium (left out) to other loads."""
-        system, force = self.solver.system, self._force_at(self.time)
+        system = self._analysis.solver.system
+        force = self._analysis.given_force(self._analysis.time)
         if system.soft.bonds or system.friction is not None:
-            # friction, and bonds an earlier step left half-way remember how they were loaded
+            # friction, and cohesive bonds that an earlier step opened in part, depend on the path
             path = system.pieces(start, loads, force)
             return [self._instant(point, straight=True) for _, point in path]
         return [self._instant(system.equilibrium(loads, force))]
@@ -195,10 +203,11 @@ class CyclicDriver(QuasiStaticDriver):
         (middle,) = self._way_to(a.state, 0.5 * (a.state.loads + b.state.loads))
         found = self._totals(middle.measured)
         guess = self._totals([0.5 * (x + y) for x, y in zip(a.measured, b.measured, strict=True)])
-        if np.all(np.abs(found - guess) <= self.cycles.change * np.maximum(largest, found)):
+        if np.all(np.abs(found - guess) <= self._cycles.change * np.maximum(largest, found)):
             return [middle, b]
         if not halvings:
-            log.warn("contact changes too often in the cycle at N = %g to follow G", self.fatigue.N)
+            N = self._analysis.fatigue.N
+            log.warn("contact changes too often in the cycle at N = %g to follow G", N)
             return [middle, b]
         first = self._between(a, middle, largest, halvings - 1)
         return first + self._between(middle, b, largest, halvings - 1)
@@ -206,14 +215,14 @@ class CyclicDriver(QuasiStaticDriver):
     def _totals(self, measured: list[Array]) -> Array:
         """Total rate at the tips of all interfaces, shape (n_tips,), force/length."""
         sums = [np.zeros(0)]
-        for g, v, values in zip(self.cracks, self._values, measured, strict=True):
+        for (g, v), values in zip(self._analysis.at_tips(), measured, strict=True):
             if len(v.tips):
                 sums.append(total(cyclic_parts(g)[1].rates(v.tips, values)))
         return np.concatenate(sums)
 
     def _extremes(self, way: list[_Instant]) -> list[TipCycle]:
         out: list[TipCycle] = []
-        for i, (g, v) in enumerate(zip(self.cracks, self._values, strict=True)):
+        for i, (g, v) in enumerate(self._analysis.at_tips()):
             criterion, evaluator = cyclic_parts(g)
             if not len(v.tips):
                 out.append(TipCycle(*np.zeros((4, 0))))
@@ -234,12 +243,12 @@ class CyclicDriver(QuasiStaticDriver):
     # -- over the cycles to the next release ---------------------------------------------
 
     def _jump(self) -> CycleJump:
-        """Jump over cycles like the present one, all interfaces together; notes what it does."""
-        fatigue, before = self.fatigue, self.fatigue.N
-        criteria = [cyclic_parts(g)[0] for g in self.cracks]
-        tips = [v.tips for v in self._values]
+        """Jump over cycles like the present one, all interfaces together, and tabulate it."""
+        fatigue, before = self._analysis.fatigue, self._analysis.fatigue.N
+        criteria = [cyclic_parts(g)[0] for g in self._analysis.active]
+        tips = [v.tips for v in self._analysis.tip_values]
         counts = [len(t) for t in tips]
-        on = [(g.p, t.node) for g, t in zip(self.cracks, tips, strict=True)]
+        on = [(g.p, t.node) for g, t in zip(self._analysis.active, tips, strict=True)]
         keep = np.repeat([c.credit for c in criteria], counts)
         credit = np.concatenate([fatigue.credit[p][nodes] for p, nodes in on])
         jump = cycle_jump(
@@ -257,30 +266,24 @@ class CyclicDriver(QuasiStaticDriver):
         fatigue.N = jump.cycles
         grown = np.where(keep, 0.0 if jump.credit is None else jump.credit, 0.0)
         at = np.cumsum([0, *counts])
-        for i, (g, (p, nodes)) in enumerate(zip(self.cracks, on, strict=True)):
+        for i, (g, (p, nodes)) in enumerate(zip(self._analysis.active, on, strict=True)):
             part = slice(at[i], at[i + 1])
             fatigue.waiting[p][nodes] = ~jump.initiated[part]
             fatigue.credit[p][nodes] = grown[part]
-            fatigue.note(
+            fatigue.tabulate(
                 before, g.title, nodes, _lengths(g, tips[i]), self._seen[i], jump.release[part]
             )
         return jump
 
-    def _let_go_after(self, jump: CycleJump) -> None:
-        """Let go at the maximum of the cycle."""
-        self._seen = []
-        counts = np.cumsum([len(v.tips) for v in self._values])
+    def _release(self, jump: CycleJump, N: float) -> None:
+        """Release at the maximum of the cycle; these bonds fail at a number of cycles."""
+        analysis = self._analysis
+        counts = np.cumsum([len(v.tips) for v in analysis.tip_values])
         parts = np.split(jump.release, counts[:-1])
-        for g, v, chosen in zip(self.cracks, self._values, parts, strict=True):
+        for (g, v), chosen in zip(analysis.at_tips(), parts, strict=True):
             if chosen.any():
-                self._release(g, g.nodes_of(v, np.flatnonzero(chosen)), v)
-        self._update_tips()
-
-    def _release(self, g: Crack, nodes: Ints, values: TipValues) -> None:
-        super()._release(g, nodes, values)
-        # these bonds failed at a number of cycles
-        last = g.records[-len(nodes) :]
-        g.records[-len(nodes) :] = [replace(record, DBT=self.fatigue.N) for record in last]
+                release_tips(analysis, g, v, np.flatnonzero(chosen), N)
+        analysis.update_tips()
 
 
 @dataclass(frozen=True)
@@ -335,9 +338,9 @@ class _SideBySide(Paris):
 
 
 def cyclic_parts(crack: Crack) -> tuple[Fatigue, RateEvaluator]:
-    """Criterion and evaluator of a crack that grows in cycles, which :func:`check_criteria` saw to.
+    """Criterion and evaluator of a crack that grows in cycles.
 
-    A criterion that says it grows in cycles has all members of these.
+    :func:`fxcrack.steps.cycles.check_criteria` has let nothing else pass.
     """
     return cast(Fatigue, crack.criterion), cast(RateEvaluator, crack.evaluator)
 
@@ -388,8 +391,8 @@ def advance(tips: Tips) -> Array:
     return np.where(tips.d_ahead > 0.0, tips.d_ahead, tips.area / tips.width)
 
 
-def _lengths(growth: Crack, tips: Tips) -> list[float]:
+def _lengths(crack: Crack, tips: Tips) -> list[float]:
     """Crack length of each tip: its own on a line, the mean of the front on a surface."""
-    mean = growth.extent.length(tips)
-    own = dict(growth.extent.lengths()) if growth.front.surface.dim == 1 else {}
+    mean = crack.extent.length(tips)
+    own = dict(crack.extent.lengths()) if crack.front.surface.dim == 1 else {}
     return [own.get(int(node), mean) for node in tips.node]

@@ -1,4 +1,4 @@
-"""Bonds that let go with time or over increments: a known fraction of the force remains."""
+"""Bonds released with time or over increments: a known fraction of their force remains."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class PrescribedRamp:
     def begin(
         cls, solver: Solver, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> PrescribedRamp:
-        """Note the bond forces of nodes that are about to let go."""
+        """Note the bond forces of nodes that are about to be released."""
         return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
 
     @property
@@ -50,7 +50,7 @@ class PrescribedRamp:
         return float(self.law.remaining(now - self.start))
 
     def breaks(self) -> tuple[float, ...]:
-        """Times at which the amplitude bends."""
+        """Times at which the amplitude changes its slope."""
         return tuple(self.start + t for t in self.law.breaks()) if self.by_time else ()
 
     @property
@@ -164,7 +164,7 @@ class ViscousCohesiveRamp:
         """Note the bond forces of nodes that are about to soften.
 
         Args:
-            solver: The model.
+            solver: The solver.
             p: Number of the pair.
             units: What softens by one law each.
             viscosity: mu, time.
@@ -206,7 +206,7 @@ class ViscousCohesiveRamp:
 
         Args:
             spent: Energy spent, force times length.
-            solver: The model.
+            solver: The solver.
             here: Jumps of the first state, shape (n_retained,).
             there: Jumps of the second state, likewise.
         """
@@ -234,7 +234,7 @@ def _sizes(force: Array, unit: Ints) -> Array:
 
 
 ForceRamp = PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
-"""Bonds whose force is given while they let go."""
+"""Bonds whose force is given while they are released."""
 
 _SPENT = 1e-12
 """Bonds of which less than this fraction of the force is left are free."""
@@ -248,7 +248,7 @@ def still_pulling(ramps: Sequence[ForceRamp], time: float, increment: int) -> li
 def bond_forces_of(solver: Solver, p: int, nodes: Ints) -> Array:
     """Forces on the slave side of bonded nodes in jump components, shape (n, gdim).
 
-    With friction, less what contact takes over at once.
+    With friction, less the part that contact carries at once.
     """
     index = solver.index[p][nodes]
     inside = (index >= 0) & ~solver.system.free[np.maximum(index, 0)]

@@ -1,202 +1,166 @@
-"""Moving along the load: pieces of equilibria, the load at which f = 1, and the way back.
+"""Moving along the load at constant bonds: to where f = 1, back to an opening, over an increment.
 
-States, energies and rows of the history are kept by :class:`~fxcrack.steps.driver.StepDriver`.
+:class:`LoadPath` says what a driver may ask for; :class:`LinearLoadPath` is that of linear bodies,
+on which equilibria are known piece by piece (contact and cohesive bonds change in between).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Protocol
 
-import numpy as np
-
-from fxcrack.base.errors import ComesApart, InputError
+from fxcrack.base.errors import ComesApart
+from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium, blend
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
-from fxcrack.steps.driver import LARGE, StepDriver
-
-BEYOND = 1e30
-"""A step without an end time that loads beyond this time would go on for ever."""
+from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.rows import Recorder
 
 
-class LoadPath(StepDriver):
-    """Ways along the load of one step, at constant bonds.
+class LoadPath(Protocol):
+    """Moves an analysis along the load of its step, at constant bonds; collective."""
 
-    Arguments as for :class:`~fxcrack.steps.driver.StepDriver`.
-    """
-
-    def _load_at_once(self) -> None:
-        """Apply loads that are there from the first moment of the step, in proportion."""
-        wanted, present = self.loads_at(self.time), self.solver.state.loads
-        if np.abs(wanted - present).max(initial=0.0) > 1e-12 * np.abs(wanted).max(initial=0.0):
-            self._follow(self._pieces(self.time), self.time)
-            self.solver.commit()
-            self._values = self._evaluate()
-
-    def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
-        return list(
-            self.solver.system.pieces(
-                self.solver.state, self.loads_at(target), self._force_at(target)
-            )
-        )
-
-    def _along(self, target: float) -> Iterator[tuple[float, Equilibrium]]:
-        """Pieces of the way to a time; where it leads nowhere, back to the last one reached."""
-        path = self.solver.system.pieces(
-            self.solver.state, self.loads_at(target), self._force_at(target)
-        )
-        while True:
-            books = self._snapshot()
-            try:
-                piece = next(path, None)
-            except (NotPositiveDefinite, ComesApart):
-                self._rollback(books)
-                raise
-            if piece is None:
-                return
-            yield piece
-
-    def _follow(self, pieces: list[tuple[float, Equilibrium]], target: float) -> None:
-        for _, point in pieces:
-            self._advance(self.solver.state, point, target)
-        self.time = target
-
-    def _snapshot(self) -> Any:
-        """What :meth:`_undo` needs to return to the present equilibrium."""
-        kept = (
-            self.time, self.increment, self.solver.state,
-            self.work, self.released, self._by_force, self.viscous,
-        )  # fmt: skip
-        return kept, self.solver.remember(), self._values, self.solver.friction_energy
-
-    def _rollback(self, books: Any) -> float:
-        """Return to an earlier equilibrium, with the same bonds, and its time."""
-        kept, states, self._values, self.solver.friction_energy = books
-        (
-            self.time, self.increment, self.solver.state,
-            self.work, self.released, self._by_force, self.viscous,
-        ) = kept  # fmt: skip
-        self.solver.recall(states)
-        return self.time
-
-    def _breaks_ahead(self) -> list[float]:
-        small = 1e-12 * abs(self.time)
-        own = [t for ramp in self._ramps for t in ramp.breaks()]
-        own += [t for g in self.cracks for t in g.evaluator.breaks()]
-        return [b for b in (*self.breaks, *own) if b > self.time + small]
-
-    def _load_to_event(self) -> bool:
-        """Load until f = 1 somewhere, an amplitude bends or the end time comes.
-
-        Returns:
-            False if the load grew beyond all bounds without an event; the state is then that of
-            the last event, or that of time 1, the loads as they were given, if none was before.
-        """
-        limit = min([self._end_time, *self._breaks_ahead()])
-        if limit >= LARGE and self._only_round_off():
-            return False
-        begin, rows = None, len(self.history)
-        if self.time > 0.0:
-            begin = self._snapshot()
-        guess = self._next_guess()
-        while guess <= BEYOND or limit < LARGE:
-            if self._to_crossing(min(guess, limit), upward=True) or self.time >= limit:
-                return True
-            if begin is None or len(self.history) > rows:
-                begin, rows = self._snapshot(), len(self.history)
-            guess = max(2.0 * self.time, self._next_guess())
-        self._rollback(begin)
-        return False
-
-    def _only_round_off(self) -> bool:
-        """Whether f under a proportional load is left over from releases, not a real force.
-
-        Arms on their last bonded node may turn freely; only a load thousands of times (with an
-        energy release rate) that of the last release would bring their f, which is round-off, to 1.
-        """
-        if self.breaks or self.solver.system.soft.bonds or self.time <= 0.0:
-            return False
-        by_load = all(g.criterion.depends_on_load for g in self.cracks)
-        released = any(g.n_released for g in self.cracks)
-        return by_load and released and max(self._largest()) < 1e-8
-
-    def _next_guess(self) -> float:
-        """A time a little after the one at which f would reach 1 under a proportional load."""
-        largest = [
-            v.f.max(initial=0.0) ** (1.0 / g.degree)
-            for g, v in zip(self.cracks, self._values, strict=True)
-            if v.f.max(initial=0.0) > 0.0
-        ]
-        if largest and self.time > 0.0:
-            return float(self.time * min(1.02 / min(max(largest), 1.0), 1e3))
-        return max(1.0, 2.0 * self.time)
-
-    def _curves_have_ended(self) -> bool:
-        """Whether growth follows curves of time alone, which end before the step does."""
-        ends = [
-            g.evaluator.ends for g, v in zip(self.cracks, self._values, strict=True) if len(v.tips)
-        ]
-        if not ends or max(ends) > self.time:
-            return False
-        return self._end_time >= LARGE and not self._breaks_ahead()
-
-    def _unload_to_event(self) -> None:
-        if not self._to_crossing(0.0, upward=False):
-            raise InputError("stepping='path': f stays above 1 down to zero load; check prestress")
-
-    def _unload_until(self, excess: Callable[[Equilibrium], float], close: float) -> bool:
-        """Take load away until a quantity that is linear along pieces has fallen to zero.
+    def to_crossing(self, target: float, *, upward: bool) -> bool:
+        """Go towards a time; stop where the largest f crosses 1.
 
         Args:
-            excess: The quantity in a state.
-            close: What counts as zero where it cannot be met exactly.
+            target: The time.
+            upward: Whether f is expected to rise to 1, or to fall to it.
 
         Returns:
-            Whether it did before the load was gone.
+            Whether it crossed 1. The tip values are those of the state reached.
         """
-        begin = self.time
-        for fraction, point in self._along(0.0):
-            here, start = self.solver.state, self.time
+
+    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+        """Take load away until a quantity has fallen to zero.
+
+        Args:
+            excess: The quantity in a state, linear along linear pieces.
+            tolerance: What counts as zero where it cannot be met exactly.
+
+        Returns:
+            Whether it fell to zero before the load was gone.
+        """
+
+    def over_increment(self, target: float) -> None:
+        """Go to a time, whatever f becomes on the way; it may still be undone by a rollback."""
+
+
+def crossing(
+    analysis: Analysis,
+    values: list[TipValues],
+    ends: tuple[Equilibrium, Equilibrium],
+    times: tuple[float, float],
+    *,
+    upward: bool,
+) -> float | None:
+    """Fraction of a linear piece at which the largest f of all active cracks crosses 1.
+
+    Args:
+        analysis: The analysis.
+        values: What the criteria said before, one entry per active crack.
+        ends: Equilibria at both ends of the piece.
+        times: Their times.
+        upward: Look for f rising to 1, or falling to it.
+
+    Returns:
+        Fraction between 0 and 1, ``None`` if f stays on its side.
+    """
+    found = [
+        g.crossing(v, *ends, times, upward=upward)
+        for g, v in zip(analysis.active, values, strict=True)
+    ]
+    if upward:
+        return min([x for x in found if x is not None], default=None)
+    # all interfaces must be below 1; one without tips does not count
+    waiting = [x for x, v in zip(found, values, strict=True) if len(v.tips)]
+    if not waiting or None in waiting:
+        return None
+    return max(x for x in waiting if x is not None)
+
+
+class LinearLoadPath:
+    """The way along the load of linear bodies.
+
+    Args:
+        analysis: The analysis, prepared for the step.
+        record: Adds a row to the history; event "snap" where cohesive bonds ran through unstable
+            states.
+    """
+
+    def __init__(self, analysis: Analysis, record: Recorder) -> None:
+        self._analysis = analysis
+        self._record = record
+
+    def to_crossing(self, target: float, *, upward: bool) -> bool:
+        """See :meth:`LoadPath.to_crossing`."""
+        analysis, system = self._analysis, self._analysis.solver.system
+        begin, values = analysis.time, analysis.tip_values
+        snaps = system.soft.counts.snaps
+        for fraction, point in self._pieces_to(target):
+            here = analysis.solver.state
+            times = (analysis.time, begin + fraction * (target - begin))
+            if system.soft.counts.snaps > snaps:
+                snaps = system.soft.counts.snaps
+                # an unstable state was passed: no equilibrium lies in between
+                analysis.advance(point, times[1])
+                analysis.evaluate_tips()
+                self._record("snap")
+                if upward and analysis.largest >= 1.0:
+                    return True
+                continue
+            hit = crossing(analysis, values, (here, point), times, upward=upward)
+            if hit is None:
+                analysis.advance(point, times[1])
+                continue
+            time = times[0] + hit * (times[1] - times[0])
+            analysis.advance(blend(here, point, hit), time)
+            analysis.evaluate_tips()
+            return True
+        analysis.time = target
+        analysis.evaluate_tips()
+        return False
+
+    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+        """See :meth:`LoadPath.back_to`; zero is met exactly."""
+        analysis = self._analysis
+        begin = analysis.time
+        for fraction, point in self._pieces_to(0.0):
+            here, start = analysis.solver.state, analysis.time
             a, b = excess(here), excess(point)
             end = begin * (1.0 - fraction)
             if b <= 0.0:
                 hit = a / (a - b)
-                self._advance(here, blend(here, point, hit), start + hit * (end - start))
-                self._values = self._evaluate()
+                analysis.advance(blend(here, point, hit), start + hit * (end - start))
+                analysis.evaluate_tips()
                 return True
-            self._advance(here, point, end)
-        self._values = self._evaluate()
+            analysis.advance(point, end)
+        analysis.evaluate_tips()
         return False
 
-    def _to_crossing(self, target: float, *, upward: bool) -> bool:
-        """Go towards a time; stop where the largest f crosses 1.
+    def over_increment(self, target: float) -> None:
+        """See :meth:`LoadPath.over_increment`."""
+        # all pieces first: where one leads nowhere, no energy is accounted for
+        for _, point in list(self._pieces(target)):
+            self._analysis.advance(point, target)
+        self._analysis.time = target
 
-        Returns:
-            Whether it did.
-        """
-        system = self.solver.system
-        begin = self.time
-        values = self._values
-        snaps = system.soft.counts.snaps
-        for fraction, point in self._along(target):
-            here = self.solver.state
-            times = (self.time, begin + fraction * (target - begin))
-            if system.soft.counts.snaps > snaps:
-                snaps = system.soft.counts.snaps
-                # an unstable state was passed: no equilibrium lies in between
-                self._advance(here, point, times[1])
-                self._values = self._evaluate()
-                self._record("snap")
-                if upward and max(self._largest()) >= 1.0:
-                    return True
-                continue
-            hit = self._hit(values, here, point, times, upward=upward)
-            if hit is None:
-                self._advance(here, point, times[1])
-                continue
-            self._advance(here, blend(here, point, hit), times[0] + hit * (times[1] - times[0]))
-            self._values = self._evaluate()
-            return True
-        self.time = target
-        self._values = self._evaluate()
-        return False
+    def _pieces(self, target: float) -> Iterator[tuple[float, Equilibrium]]:
+        """Linear pieces of the way to a time: the fraction at which each ends, and its end."""
+        analysis = self._analysis
+        loads, force = analysis.loads_at(target), analysis.given_force(target)
+        return analysis.solver.system.pieces(analysis.solver.state, loads, force)
+
+    def _pieces_to(self, target: float) -> Iterator[tuple[float, Equilibrium]]:
+        """The same; where a piece leads nowhere, back to the end of the last one."""
+        path = self._pieces(target)
+        while True:
+            saved = self._analysis.snapshot()
+            try:
+                piece = next(path, None)
+            except (NotPositiveDefinite, ComesApart):
+                self._analysis.rollback(saved)
+                raise
+            if piece is None:
+                return
+            yield piece

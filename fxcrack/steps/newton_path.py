@@ -1,13 +1,13 @@
-"""Marching a nonlinear continuum: predict on the tangent, correct, find where f = 1 by secants.
+"""Moving along the load of nonlinear bodies: predict on the tangent, correct, secants to f = 1.
 
 Every accepted state is an equilibrium. The next one is sought where the tangent says f = 1 (for
-linear bodies exactly there). If f is below 1 it is a step on the way; if above, it is forgotten
-and the secant through both ends gives the next guess.
+linear bodies exactly there). If f is below 1 it is a step on the way; if above, it is undone and
+the secant through both ends gives the next guess.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from fxcrack.base import log
 from fxcrack.base.errors import ConvergenceError, InputError
@@ -15,75 +15,83 @@ from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.increment_work import FINE, EnergyImbalance
 from fxcrack.solvers.newton import NewtonSolver
-from fxcrack.steps.increment_stepping import TooManyCutbacks
-from fxcrack.steps.quasi_static import QuasiStaticDriver
+from fxcrack.steps.analysis import Analysis, largest
+from fxcrack.steps.increment_control import TooManyCutbacks
+from fxcrack.steps.load_path import crossing
+from fxcrack.steps.rows import Recorder
+from fxcrack.steps.static import Static
 
 _AT_ONE = 1e-9
 """How near to 1 the criterion must be at an onset."""
 _NEAR_ONE = 1e-7
 """How near to 1 the iteration's own tolerance may leave f, where it no longer comes nearer."""
 _MANY = 30
-"""Times f = 1 is looked for on the way back."""
-_NO_WAY = 4e-16
-"""Part of the time below which no way is made."""
+"""Iterations in which f = 1, or the controlled opening, must be found."""
+_NO_PROGRESS = 4e-16
+"""Increments below this part of the time are round-off."""
 _SMALLEST = 1e-6
-"""Smallest piece of a way, before it counts as impassable."""
+"""Smallest increment, as a part of the whole, before the search is given up."""
 
 
-class NewtonLoadPath(QuasiStaticDriver):
-    """One step on a :class:`~fxcrack.solvers.newton.NewtonSolver`.
+class NewtonLoadPath:
+    """The way along the load of nonlinear bodies.
 
-    Arguments as for :class:`~fxcrack.steps.driver.StepDriver`.
+    Args:
+        analysis: The analysis, prepared for the step.
+        solver: Its solver.
+        step: Controls; ``maximum`` limits the increments.
+        record: Adds a row to the history; event "increment" at each equilibrium on the way.
+
+    Raises:
+        InputError: The step looks for equilibria, but the bodies move in time.
     """
 
-    solver: NewtonSolver
-
-    def run(self) -> str:
-        """March until an end condition holds; returns why the step ended."""
-        if self.solver.bodies.dynamic and self.step.stepping != "increment":
+    def __init__(
+        self, analysis: Analysis, solver: NewtonSolver, step: Static, record: Recorder
+    ) -> None:
+        if solver.bodies.dynamic and step.stepping != "increment":
             raise InputError(
-                f"stepping='{self.step.stepping}' looks for equilibria, but Inertia moves the "
+                f"stepping='{step.stepping}' looks for equilibria, but Inertia moves the "
                 "bodies in time; use a Dynamic step, or leave Inertia out"
             )
-        self.solver.exact = any(
-            c.needs_exact_S for g in self.cracks for c in (g.debond.criterion, *g.debond.watch)
+        self._analysis = analysis
+        self._solver = solver
+        self._maximum = step.maximum
+        self._record = record
+        solver.exact = any(
+            c.needs_exact_S for g in analysis.active for c in (g.debond.criterion, *g.debond.watch)
         )
-        return super().run()
 
-    def _to_crossing(self, target: float, *, upward: bool) -> bool:
-        """Go towards a time; stop where the largest f crosses 1.
-
-        Returns:
-            Whether it did.
+    def to_crossing(self, target: float, *, upward: bool) -> bool:
+        """See :meth:`fxcrack.steps.load_path.LoadPath.to_crossing`.
 
         Raises:
             TooManyCutbacks: No equilibrium was found, however small the increment.
         """
-        whole = abs(target - self.time)
-        size = self.step.maximum
+        whole = abs(target - self._analysis.time)
+        size = self._maximum
         beyond: tuple[float, float] | None = None
         idle, strict = 0, True
         while True:
             if self._renew():
                 beyond = None  # with other pairs f was another one there
-            begin = self.time
+            begin = self._analysis.time
             way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
             guess = self._predicted(begin + way, upward=upward)
             if beyond is not None:
                 guess = self._secant(beyond, guess)
                 guess = begin + min(max(guess - begin, -size), size)
-            here = self.solver.state
             try:
                 point, values = self._try(guess, strict=strict)
-                level = _largest(values)
+                level = largest(values)
                 off = level - 1.0 if upward else 1.0 - level
                 crossed = off > _AT_ONE and abs(guess - begin) > _SMALLEST * _AT_ONE * whole
-                if crossed and not self._goes_back:
-                    self.solver.revert()
+                if crossed and not self._reversible:
+                    self._solver.revert()
                     beyond = (guess, level)
                     continue
-                if not self.solver.exact:
-                    self.solver.confirm(strict=strict)
+                if not self._solver.exact:
+                    self._solver.confirm(strict=strict)
             except EnergyImbalance as error:
                 size = 0.5 * abs(guess - begin)
                 strict = size > FINE * whole
@@ -96,9 +104,9 @@ class NewtonLoadPath(QuasiStaticDriver):
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
             strict = True
-            before, self._values = max(self._largest()), values
-            self._advance(here, point, guess)
-            self.solver.commit()
+            before, self._analysis.tip_values = self._analysis.largest, values
+            self._analysis.advance(point, guess)
+            self._solver.commit()
             if crossed:
                 self._back_to_one((begin, before))
                 return True
@@ -106,31 +114,31 @@ class NewtonLoadPath(QuasiStaticDriver):
                 return True
             if guess == target:
                 return False
-            idle = idle + 1 if abs(guess - begin) <= _NO_WAY * abs(begin) else 0
+            idle = idle + 1 if abs(guess - begin) <= _NO_PROGRESS * abs(begin) else 0
             if idle:
                 beyond = None
             if idle > _MANY:
                 raise TooManyCutbacks(f"f stays at {level:.9g} where it should reach 1")
             if beyond is None:
-                size = min(2.0 * size, self.step.maximum)
+                size = min(2.0 * size, self._maximum)
                 self._record("increment")
 
     @property
-    def _goes_back(self) -> bool:
-        """Whether a way back leads through the same equilibria: nothing remembers the way there."""
-        solver = self.solver
-        remembers = solver.bodies.path_dependent or solver.system.soft.bonds or self._ramps
+    def _reversible(self) -> bool:
+        """Whether the way back passes through the same equilibria: nothing depends on the path."""
+        solver = self._solver
+        dependent = solver.bodies.path_dependent or solver.system.soft.bonds or self._analysis.ramps
         slides = solver.system.friction is not None or solver.interfaces.follow_sliding
-        return not (remembers or slides)
+        return not (dependent or slides)
 
     def _try(self, at: float, *, strict: bool = False) -> tuple[Equilibrium, list[TipValues]]:
         """The equilibrium at a time, a trial, and the criteria there."""
-        point = self._move(at, confirm=self.solver.exact, strict=strict)
-        return point, self._evaluate_at(point, at)
+        point = self._move(at, confirm=self._solver.exact, strict=strict)
+        return point, self._analysis.evaluate(point, at)
 
     def _move(self, at: float, **options: bool) -> Equilibrium:
-        loads, force = self.loads_at(at), self._force_at(at)
-        return self.solver.move(loads, force, at, at - self.time, **options)
+        loads, force = self._analysis.loads_at(at), self._analysis.given_force(at)
+        return self._solver.move(loads, force, at, at - self._analysis.time, **options)
 
     def _back_to_one(self, other: tuple[float, float]) -> None:
         """From beyond f = 1 to where it is, along the way that led here.
@@ -142,34 +150,39 @@ class NewtonLoadPath(QuasiStaticDriver):
             TooManyCutbacks: No equilibrium was found.
         """
         for _ in range(_MANY):
-            level = max(self._largest())
+            level = self._analysis.largest
             if abs(level - 1.0) <= _AT_ONE:
                 return
-            guess = self._predicted(other[0], upward=other[0] > self.time)
+            guess = self._predicted(other[0], upward=other[0] > self._analysis.time)
             if guess == other[0]:
                 guess = self._secant(other, guess)
-            here, begin = self.solver.state, (self.time, level)
+            begin = (self._analysis.time, level)
             try:
                 point, values = self._try(guess)
-                if not self.solver.exact:
-                    self.solver.confirm()
+                if not self._solver.exact:
+                    self._solver.confirm()
             except ConvergenceError as error:
                 raise TooManyCutbacks(str(error)) from error
-            self._values = values
-            self._advance(here, point, guess)
-            self.solver.commit()
-            after = _largest(values)
+            self._analysis.tip_values = values
+            self._analysis.advance(point, guess)
+            self._solver.commit()
+            after = largest(values)
             if (level - 1.0) * (after - 1.0) < 0.0:
                 other = begin
             if abs(after - 1.0) < _NEAR_ONE and abs(after - 1.0) > 0.5 * abs(level - 1.0):
                 return  # nearer than the iteration can tell
 
-    def _unload_until(self, excess: Callable[[Equilibrium], float], close: float) -> bool:
-        whole, size, back = self.time, self.step.maximum, self.time
+    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+        """See :meth:`fxcrack.steps.load_path.LoadPath.back_to`.
+
+        Raises:
+            TooManyCutbacks: No equilibrium was found.
+        """
+        whole, size, back = self._analysis.time, self._maximum, self._analysis.time
         for _ in range(_MANY + int(min(whole / size, 1e4))):
-            here, begin, value = self.solver.state, self.time, excess(self.solver.state)
-            self._values = self._evaluate()
-            if abs(value) <= close:
+            begin, value = self._analysis.time, excess(self._solver.state)
+            self._analysis.evaluate_tips()
+            if abs(value) <= tolerance:
                 return True
             if value > 0.0 and begin <= 0.0:
                 return False
@@ -181,19 +194,22 @@ class NewtonLoadPath(QuasiStaticDriver):
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
                 continue
-            self._advance(here, point, guess)
-            self.solver.commit()
+            self._analysis.advance(point, guess)
+            self._solver.commit()
             if value > 0.0:
                 back = begin
         raise TooManyCutbacks("the load at the controlled opening is not found")
 
+    def _predictions(self, target: float) -> Iterator[tuple[float, Equilibrium]]:
+        """Linear pieces to a time on the tangent: the fraction at which each ends, and its end."""
+        loads, force = self._analysis.loads_at(target), self._analysis.given_force(target)
+        return self._solver.system.pieces(self._solver.state, loads, force)
+
     def _zero(self, excess: Callable[[Equilibrium], float], value: float, target: float) -> float:
         """Time on the way to a target where the tangent has a quantity at zero, or the target."""
-        system = self.solver.system
-        saved = self.solver.interface_state()
-        begin, done, found = self.time, 0.0, target
-        state, loads, force = self.solver.state, self.loads_at(target), self._force_at(target)
-        for fraction, point in system.pieces(state, loads, force):
+        saved = self._solver.interface_state()
+        begin, done, found = self._analysis.time, 0.0, target
+        for fraction, point in self._predictions(target):
             after = excess(point)
             if value * after <= 0.0:
                 found = begin + (target - begin) * (
@@ -201,74 +217,72 @@ class NewtonLoadPath(QuasiStaticDriver):
                 )
                 break
             done, value = fraction, after
-        self.solver.restore_interfaces(saved)
+        self._solver.restore_interfaces(saved)
         return found
 
     def _predicted(self, target: float, *, upward: bool) -> float:
         """Time before a target at which f reaches 1 on the tangent; the target if it does not."""
-        system = self.solver.system
-        saved = self.solver.interface_state()
-        here, begin, done, found = self.solver.state, self.time, 0.0, target
-        for fraction, point in system.pieces(here, self.loads_at(target), self._force_at(target)):
+        saved = self._solver.interface_state()
+        here, begin, done, found = self._solver.state, self._analysis.time, 0.0, target
+        for fraction, point in self._predictions(target):
             a, b = (begin + x * (target - begin) for x in (done, fraction))
-            hit = self._hit(self._values, here, point, (a, b), upward=upward) if a != b else None
+            hit = None
+            if a != b:
+                values = self._analysis.tip_values
+                hit = crossing(self._analysis, values, (here, point), (a, b), upward=upward)
             if hit is not None:
                 found = a + hit * (b - a)
                 break
             here, done = point, fraction
-        self.solver.restore_interfaces(saved)
+        self._solver.restore_interfaces(saved)
         return found
 
     def _secant(self, beyond: tuple[float, float], predicted: float) -> float:
         """Time between the present one and one at which f was beyond 1, near f = 1."""
         far, level = beyond
-        present = max(self._largest())
-        degree = max(g.degree for g in self.cracks)
+        present = self._analysis.largest
+        degree = max(g.degree for g in self._analysis.active)
         a, b = present ** (1.0 / degree) - 1.0, level ** (1.0 / degree) - 1.0
-        secant = self.time - a * (far - self.time) / (b - a)
-        low, high = sorted((self.time, far))
+        secant = self._analysis.time - a * (far - self._analysis.time) / (b - a)
+        low, high = sorted((self._analysis.time, far))
         inside = low < predicted < high
         margin = 1e-3 * (high - low)
         guess = predicted if inside and present > 0.9 else secant
         return float(min(max(guess, low + margin), high - margin))
 
-    def _evaluate_at(self, state: Equilibrium, time: float) -> list[TipValues]:
-        # tips anew: normals and lengths at the front follow the bodies
-        return [g.evaluate(g.tips(), state, time) for g in self.cracks]
-
-    def _evaluate(self) -> list[TipValues]:
-        return self._evaluate_at(self.solver.state, self.time)
-
     def _renew(self) -> bool:
         """Renew the pairing of faces that have slid, where the bodies move far; whether it has."""
-        changed = self.solver.renew_pairs()
+        changed = self._solver.renew_pairs()
         if changed:
-            self.work += self.solver.settle(self._force_at(self.time))
-            self._values = self._evaluate()
+            force = self._analysis.given_force(self._analysis.time)
+            self._analysis.balance.external_work += self._solver.settle(force)
+            self._analysis.evaluate_tips()
         return changed
 
-    def _pieces(self, target: float) -> list[tuple[float, Equilibrium]]:
+    def over_increment(self, target: float) -> None:
+        """See :meth:`fxcrack.steps.load_path.LoadPath.over_increment`.
+
+        Raises:
+            ConvergenceError: No equilibrium was found.
+        """
         self._renew()
-        return [(1.0, self._approach(target, FINE * abs(target - self.time)))]
+        end = self._approach(target, FINE * abs(target - self._analysis.time))
+        self._analysis.advance(end, target)
 
     def _approach(self, target: float, least: float) -> Equilibrium:
-        """A trial at a time; where energies of the way do not add up, half of it is gone first.
+        """A trial at a time; where the energies of the increment do not balance, half of it first.
 
         Args:
             target: Time of the trial.
-            least: Ways in time that are taken whatever their energies are.
+            least: Increments of time that are accepted whatever their energies are.
         """
         try:
-            return self._move(target, strict=abs(target - self.time) > least)
+            return self._move(target, strict=abs(target - self._analysis.time) > least)
         except EnergyImbalance as error:
             log.info("half of an increment first: %s", error)
-        middle = 0.5 * (self.time + target)
+        middle = 0.5 * (self._analysis.time + target)
         point = self._approach(middle, least)
-        self._advance(self.solver.state, point, middle)
-        self.solver.commit()
+        self._analysis.advance(point, middle)
+        self._solver.commit()
         self._renew()
         return self._approach(target, least)
-
-
-def _largest(values: list[TipValues]) -> float:
-    return max((float(v.f.max(initial=0.0)) for v in values), default=0.0)

@@ -1,328 +1,254 @@
-"""Marching a quasi-static step: load, find where f = 1, let go, find the new equilibrium.
+"""Quasi-static steps: load, find where f = 1, release, find the new equilibrium.
 
-The way along the load is :class:`~fxcrack.steps.load_path.LoadPath`'s.
+One function per stepping: from event to event, along the equilibrium path at f = 1, and at a
+controlled opening; increments are in :mod:`fxcrack.steps.increment_stepping`.
 """
 
 from __future__ import annotations
 
-import time as clock
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from fxcrack.base import log
-from fxcrack.base.errors import ComesApart, ConvergenceError, InputError, unknown_name
-from fxcrack.criteria.evaluator import TipValues
+from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
-from fxcrack.history import Row
 from fxcrack.solvers.base import Solver
+from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
-from fxcrack.steps.driver import LARGE
-from fxcrack.steps.increment_stepping import IncrementControl, TooManyCutbacks
-from fxcrack.steps.load_path import BEYOND, LoadPath
+from fxcrack.steps.driver import BEYOND, LARGE, StepDriver
+from fxcrack.steps.increment_stepping import step_by_increments
+from fxcrack.steps.release import release_critical
+from fxcrack.steps.static import Static
 
-Observer = Callable[[str, Row], None]
-
-_AT_TOP, _NEAR_TOP = 1e-6, 1e-2
-"""How far f may differ from the upper end of its window by what one node has of the next, and the
-fraction of the window in which it is so near that end that cutting back gains nothing."""
 _NEVER = (
     "the criterion is not reached however large the load becomes; the step ends where that search "
     "began"
 )
+_BELOW, _ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
+"""Values of f between these count as 1."""
 
 
-class QuasiStaticDriver(LoadPath):
-    """One quasi-static step on a condensed model: the three ways to step.
+def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
+    """Run a quasi-static step; collective.
 
-    Arguments as for :class:`~fxcrack.steps.driver.StepDriver`.
+    Args:
+        analysis: The analysis, prepared for the step, its cracks activated.
+        step: Controls and end conditions.
+        **controls: Observer, checkpoints and resumption, as for
+            :class:`~fxcrack.steps.driver.StepDriver`.
 
-    Attributes:
-        control: Size of the next increment.
-        done: Increments tried so far.
+    Returns:
+        Why the step ended.
+
+    Raises:
+        InputError: Release laws, bodies and stepping do not go together.
     """
+    driver = StepDriver(analysis, step, **controls)
+    _check_releases(analysis, step)
+    return driver.run(_STEPPINGS[step.stepping])
 
-    def __init__(self, *parts: Any, **carried: Any) -> None:
-        super().__init__(*parts, **carried)
-        self.control = IncrementControl(self.step)
-        self.done = 0
-        if self._resume is not None:
-            self.control.size = self._resume["size"]
-            self.control.cutbacks = self._resume["cutbacks"]
-            self.done = self._resume["done"]
 
-    def carried(self) -> dict[str, Any]:
-        """Energies and counters, those of increments included."""
-        control = {"size": self.control.size, "cutbacks": self.control.cutbacks}
-        return {**super().carried(), **control, "done": self.done}
-
-    def run(self) -> str:
-        """March until an end condition holds; returns why the step ended."""
-        for g in self.cracks:
-            viscosity, law = g.criterion.viscosity, g.debond.release
-            over_increments = law.driver == "increments"
-            if over_increments and self.step.stepping != "increment":
-                raise InputError(
-                    f"interface '{g.title}' is released by {law} over increments, which "
-                    f"stepping='{self.step.stepping}' does not have; use stepping='increment', "
-                    "or a ramp with the opening (no number of increments)"
-                )
-            if viscosity > 0.0 and over_increments:
-                raise InputError(
-                    f"interface '{g.title}': viscosity delays a release at once or with the "
-                    f"opening, not {law} over increments; use viscosity=0 or another release"
-                )
-            if viscosity > 0.0 and self.step.stepping != "increment":
-                raise InputError(
-                    f"interface '{g.title}': viscosity acts over increments of time, which "
-                    f"stepping='{self.step.stepping}' does not have; use stepping='increment' "
-                    "or viscosity=0"
-                )
-        start = clock.perf_counter()
-        before = {k: v for k, v in self.solver.timings.seconds.items() if k.startswith("factor")}
-        self._update_tips()
-        if self._resume is None:
-            self._load_at_once()
-            self._record("start")
-        try:
-            if self.step.stepping == "increment":
-                reason = self._run_increments()
-            elif self.step.stepping == "path":
-                reason = self._run_path()
-            elif self.step.stepping == "opening":
-                reason = self._run_opening()
-            else:
-                reason = self._run_events()
-        except (NotPositiveDefinite, ComesApart) as error:
-            reason = self._separated(error)
-        except (TooManyCutbacks, ConvergenceError) as error:
-            reason = f"stopped: {error}"
-            log.warn("%s", reason)
-        self._record("end")
-        after = {k: v for k, v in self.solver.timings.seconds.items() if k.startswith("factor")}
-        inside = sum(after.values()) - sum(before.values())
-        self.solver.timings.add("march", start + inside)
-        return reason
-
-    def _run_events(self) -> str:
-        while True:
-            self._at_checkpoint_point()
-            reason = self._ended()
-            if reason:
-                return reason
-            if max(self._largest()) >= 1.0 - 1e-9:
-                self._record("onset")
-                self._release_critical()
-                continue
-            if self._curves_have_ended():
-                return "the curves of crack length against time have ended"
-            if not self._load_to_event():
-                return self._ended() or self._never()
-            if max(self._largest()) < 1.0 - 1e-9 and not self._ended():
-                self._record("bend")
-
-    def _never(self) -> str:
-        """Why the load was raised in vain."""
-        if not np.any(self.loads_at(self.time + 1.0)):
-            return "no load acts in this step and no support moves, so the criterion is not reached"
-        last = max([self.time, *self.breaks])
-        if self.breaks and np.array_equal(self.loads_at(last), self.loads_at(last + 1.0)):
-            return (
-                f"the loads stay as they are from time {last:g} on, where their amplitudes end, "
-                "and the criterion is not reached"
-            )
-        return _NEVER
-
-    def _only_proportional(self) -> None:
-        """Refuse what a load that moves forth and back cannot do."""
-        stepping = f"stepping='{self.step.stepping}'"
-        if self.breaks:
+def _check_releases(analysis: Analysis, step: Static) -> None:
+    """Refuse releases over increments where the stepping has none."""
+    for g in analysis.active:
+        viscosity, law = g.criterion.viscosity, g.debond.release
+        over_increments = law.driver == "increments"
+        if over_increments and step.stepping != "increment":
             raise InputError(
-                f"{stepping} follows one proportional load; use the default amplitude for "
-                "all loads of the step"
+                f"interface '{g.title}' is released by {law} over increments, which "
+                f"stepping='{step.stepping}' does not have; use stepping='increment', "
+                "or a ramp with the opening (no number of increments)"
             )
-        for g in self.cracks:
-            if g.evaluator.breaks() or g.debond.release.driver == "time" or self._ramps:
+        if viscosity > 0.0 and over_increments:
+            raise InputError(
+                f"interface '{g.title}': viscosity delays a release at once or with the "
+                f"opening, not {law} over increments; use viscosity=0 or another release"
+            )
+        if viscosity > 0.0 and step.stepping != "increment":
+            raise InputError(
+                f"interface '{g.title}': viscosity acts over increments of time, which "
+                f"stepping='{step.stepping}' does not have; use stepping='increment' "
+                "or viscosity=0"
+            )
+
+
+# -- steppings -------------------------------------------------------------------------------------
+
+
+def step_by_events(driver: StepDriver) -> str:
+    """Go from release to release, each at exactly f = 1; returns why the step ended."""
+    analysis = driver.analysis
+    while True:
+        driver.checkpoint_point()
+        reason = driver.ended()
+        if reason:
+            return reason
+        if analysis.largest >= _BELOW:
+            driver.record("onset")
+            release_critical(analysis)
+            driver.record("release")
+            continue
+        if _curves_have_ended(driver):
+            return "the curves of crack length against time have ended"
+        if not _load_to_event(driver):
+            return driver.ended() or _never(driver)
+        if analysis.largest < _BELOW and not driver.ended():
+            driver.record("bend")
+
+
+def step_along_path(driver: StepDriver) -> str:
+    """Keep a proportional load on the equilibrium path at f = 1; returns why the step ended."""
+    analysis = driver.analysis
+    _check_proportional(driver)
+    while True:
+        driver.checkpoint_point()
+        reason = driver.ended()
+        if reason:
+            return reason
+        if analysis.largest > _ABOVE:
+            if not driver.path.to_crossing(0.0, upward=False):
                 raise InputError(
-                    f"interface '{g.title}' grows or lets go with time, which {stepping} does "
-                    "not have: it moves the load forth and back; use 'event' or 'increment'"
+                    "stepping='path': f stays above 1 down to zero load; check prestress"
                 )
+        elif analysis.largest < _BELOW and not _load_to_event(driver):
+            return driver.ended() or _never(driver)
+        driver.record("onset")
+        release_critical(analysis)
+        driver.record("release")
 
-    def _run_opening(self) -> str:
-        self._only_proportional()
-        control = OpeningControl(self.solver, self.cracks, self.step.monitors)
-        while True:
-            self._at_checkpoint_point()
-            reason = self._ended()
-            if reason:
-                return reason
-            if max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
-                return self._ended() or self._never()
-            if max(self._largest()) < 1.0 - 1e-9:
-                continue  # the end time came first
-            control.reach(self.solver.state)
-            self._record("onset")
-            self._free()
-            more = control.excess(self.solver.state)
-            same = abs(more) <= control.close
-            if not same and not (more > 0.0 and self._unload_until(control.excess, control.close)):
-                raise InputError(
-                    f"stepping='opening': nodes let go at {self.time:.6g} times the load, and "
-                    f"'{control.name}' = {control.opening:.6g} is not found again at less; control "
-                    "a displacement nearer to the crack, or use stepping='path'"
-                )
-            self._record("release")
 
-    def _run_path(self) -> str:
-        self._only_proportional()
-        while True:
-            self._at_checkpoint_point()
-            reason = self._ended()
-            if reason:
-                return reason
-            if max(self._largest()) > 1.0 + 1e-9:
-                self._unload_to_event()
-            elif max(self._largest()) < 1.0 - 1e-9 and not self._load_to_event():
-                return self._ended() or self._never()
-            self._record("onset")
-            self._release_critical()
+def step_by_opening(driver: StepDriver) -> str:
+    """Find a proportional load from an opening that never falls; returns why the step ended."""
+    analysis = driver.analysis
+    _check_proportional(driver)
+    control = OpeningControl(analysis.solver, analysis.active, driver.step.monitors)
+    while True:
+        driver.checkpoint_point()
+        reason = driver.ended()
+        if reason:
+            return reason
+        if analysis.largest < _BELOW and not _load_to_event(driver):
+            return driver.ended() or _never(driver)
+        if analysis.largest < _BELOW:
+            continue  # the end time came first
+        control.reach(analysis.solver.state)
+        driver.record("onset")
+        release_critical(analysis)
+        more = control.excess(analysis.solver.state)
+        same = abs(more) <= control.close
+        if not same and not (more > 0.0 and driver.path.back_to(control.excess, control.close)):
+            raise InputError(
+                f"stepping='opening': nodes were released at {analysis.time:.6g} times the load, "
+                f"and '{control.name}' = {control.opening:.6g} is not found again at less; control "
+                "a displacement nearer to the crack, or use stepping='path'"
+            )
+        driver.record("release")
 
-    def _run_increments(self) -> str:
-        control, creeps = self.control, False
-        while True:
-            self._at_checkpoint_point()
-            reason = self._ended()
-            if reason:
-                return reason
-            self.done += 1
-            if self.done > self.step.max_increments:
-                return (
-                    f"stopped: {self.step.max_increments} increments done without reaching the "
-                    "end condition; raise max_increments or maximum, or end the step at a Time"
-                )
-            if self.time > BEYOND and self._end_time >= LARGE:
-                return "the criterion is not reached however large the load becomes"
-            control.size = max(control.size, min(self._scaled(), self.step.maximum))
-            met = self._met_at_start()
-            smallest = creeps or any(met)
-            size = self.step.minimum if smallest else control.size
-            target = min([self.time + size, self._end_time, *self._breaks_ahead()])
-            books = self._snapshot()
-            self.increment += 1
-            try:
-                pieces = self._pieces(target)
-            except (NotPositiveDefinite, ComesApart):
-                self._rollback(books)  # contact and bonds have changed half of the way
-                raise
-            except ConvergenceError as error:
-                self._rollback(books)
-                control.rejected(target - self.time, str(error))
-                continue
-            self._follow(pieces, target)
-            values = self._evaluate()
-            excess = [
-                v.f.max(initial=0.0) - self._upper(g)
-                for g, v, no_matter in zip(self.cracks, values, met, strict=True)
-                if not no_matter
-            ]
-            if max(excess, default=-1.0) > (_AT_TOP if creeps else 1e-12):
-                used = target - self._rollback(books)
-                creeps = not creeps and self._cuts_in_vain(values, used)
-                if not creeps:
-                    control.rejected(used, f"f = {max(v.f.max(initial=0.0) for v in values):.4g}")
-                continue
-            self._values = values
-            self.solver.commit()
-            for ramp in self._ramps:
-                ramp.accept(self.time, self.solver)
-            self._record("increment")
-            if not smallest:
-                control.accepted()
-            creeps = False
-            while self._any_ready() and not self._ended():
-                self._release_critical(all_ready=True)
-                control.suggest(self._first_increment())
-                if not self._may_run_on():
-                    break
 
-    def _scaled(self) -> float:
-        """Increment that brings a proportional load near the first release, else 0."""
-        beta = self.step.linear_scaling
-        if beta is None or self.time <= 0.0 or any(g.n_released for g in self.cracks):
-            return 0.0
-        reach = [
-            float(v.f.max()) ** (-1.0 / g.degree)
-            for g, v in zip(self.cracks, self._values, strict=True)
-            if v.f.max(initial=0.0) > 0.0
-        ]
-        return max(self.time * (beta * min(reach) - 1.0), 0.0) if reach else 0.0
+_STEPPINGS: dict[str, Callable[[StepDriver], str]] = {
+    "event": step_by_events,
+    "path": step_along_path,
+    "opening": step_by_opening,
+    "increment": step_by_increments,
+}
 
-    def _any_ready(self) -> bool:
-        """Whether some f has reached the lower end of its window."""
-        return any(
-            v.f.max(initial=0.0) >= g.criterion.release_range[0]
-            for g, v in zip(self.cracks, self._values, strict=True)
+
+# -- loading ---------------------------------------------------------------------------------------
+
+
+def _load_to_event(driver: StepDriver) -> bool:
+    """Load until f = 1 somewhere, an amplitude changes its slope or the end time comes.
+
+    Returns:
+        False if the load grew beyond all bounds without an event; the state is then that of
+        the last event, or that of time 1, the loads as they were given, if none was before.
+    """
+    analysis = driver.analysis
+    limit = min([driver.end_time, *driver.breaks_ahead()])
+    if limit >= LARGE and _only_round_off(driver):
+        return False
+    begin, rows = None, len(analysis.history)
+    if analysis.time > 0.0:
+        begin = analysis.snapshot()
+    guess = _next_guess(analysis)
+    while guess <= BEYOND or limit < LARGE:
+        if driver.path.to_crossing(min(guess, limit), upward=True) or analysis.time >= limit:
+            return True
+        if begin is None or len(analysis.history) > rows:
+            begin, rows = analysis.snapshot(), len(analysis.history)
+        guess = max(2.0 * analysis.time, _next_guess(analysis))
+    assert begin is not None
+    analysis.rollback(begin)
+    return False
+
+
+def _only_round_off(driver: StepDriver) -> bool:
+    """Whether f under a proportional load is left over from releases, not a real force.
+
+    Arms on their last bonded node may turn freely; only a load thousands of times (with an
+    energy release rate) that of the last release would bring their f, which is round-off, to 1.
+    """
+    analysis = driver.analysis
+    if driver.breaks or analysis.solver.system.soft.bonds or analysis.time <= 0.0:
+        return False
+    by_load = all(g.criterion.depends_on_load for g in analysis.active)
+    released = any(g.n_released for g in analysis.active)
+    return by_load and released and analysis.largest < 1e-8
+
+
+def _next_guess(analysis: Analysis) -> float:
+    """A time a little after the one at which f would reach 1 under a proportional load."""
+    found = [
+        v.f.max(initial=0.0) ** (1.0 / g.degree)
+        for g, v in analysis.at_tips()
+        if v.f.max(initial=0.0) > 0.0
+    ]
+    if found and analysis.time > 0.0:
+        return float(analysis.time * min(1.02 / min(max(found), 1.0), 1e3))
+    return max(1.0, 2.0 * analysis.time)
+
+
+def _curves_have_ended(driver: StepDriver) -> bool:
+    """Whether growth follows curves of time alone, which end before the step does."""
+    ends = [g.evaluator.ends for g, v in driver.analysis.at_tips() if len(v.tips)]
+    if not ends or max(ends) > driver.analysis.time:
+        return False
+    return driver.end_time >= LARGE and not driver.breaks_ahead()
+
+
+def _never(driver: StepDriver) -> str:
+    """Why the load was raised in vain."""
+    analysis, breaks = driver.analysis, driver.breaks
+    if not np.any(analysis.loads_at(analysis.time + 1.0)):
+        return "no load acts in this step and no support moves, so the criterion is not reached"
+    last = max([analysis.time, *breaks])
+    if breaks and np.array_equal(analysis.loads_at(last), analysis.loads_at(last + 1.0)):
+        return (
+            f"the loads stay as they are from time {last:g} on, where their amplitudes end, "
+            "and the criterion is not reached"
         )
+    return _NEVER
 
-    def _first_increment(self) -> float:
-        """Increment suggested after nodes have just begun to let go, inf without a suggestion."""
-        return min(
-            (r.suggested_increment for r in self._ramps if r.by_time and r.start == self.time),
-            default=np.inf,
+
+def _check_proportional(driver: StepDriver) -> None:
+    """Refuse what a load that moves forth and back cannot do."""
+    stepping = f"stepping='{driver.step.stepping}'"
+    if driver.breaks:
+        raise InputError(
+            f"{stepping} follows one proportional load; use the default amplitude for "
+            "all loads of the step"
         )
+    analysis = driver.analysis
+    for g in analysis.active:
+        if g.evaluator.breaks() or g.debond.release.driver == "time" or analysis.ramps:
+            raise InputError(
+                f"interface '{g.title}' grows or is released with time, which {stepping} does "
+                "not have: it moves the load forth and back; use 'event' or 'increment'"
+            )
 
-    def _upper(self, g: Crack) -> float:
-        upper, unstable = g.criterion.release_range[1], g.criterion.unstable_tolerance
-        if unstable is not None and g.n_released:
-            upper = max(upper, 1.0 + unstable)
-        return upper
 
-    def _met_at_start(self) -> list[bool]:
-        """Per interface, whether f is in its window already at the start of an increment.
-
-        That goes for criteria other than energy release rates, right after nodes have let go. The
-        smallest increment is used then, and the nodes go at its end whatever their f is: cutting
-        back could not make it smaller.
-        """
-        return [
-            g.criterion.smallest_increment_when_met
-            and bool(v.f.max(initial=0.0) >= g.criterion.release_range[0])
-            for g, v in zip(self.cracks, self._values, strict=True)
-        ]
-
-    def _cuts_in_vain(self, after: list[TipValues], used: float) -> bool:
-        """Whether the cutbacks left cannot keep f in its window, and the smallest increment can.
-
-        So it is where growth is neutral: f stays what it was when a node goes, at the upper end of
-        its window at last. The next node then goes at the same load.
-
-        Args:
-            after: What the criteria said at the end of the increment that was undone.
-            used: Its size, time.
-        """
-        left = self.step.cutback ** (self.step.max_cutbacks - self.control.cutbacks)
-        left = max(left, self.step.minimum / used)
-        for g, v, w in zip(self.cracks, self._values, after, strict=True):
-            upper, f, later = self._upper(g), v.f.max(initial=0.0), w.f.max(initial=0.0)
-            if later <= upper:
-                continue
-            low = g.criterion.release_range[0]
-            near = f >= upper - _NEAR_TOP * (upper - low) or left * (later - f) > upper - f
-            if not (low <= f <= upper + _AT_TOP and near):
-                return False
-        return True
-
-    def _may_run_on(self) -> bool:
-        """Whether more nodes may go at this load: within the unstable growth tolerance."""
-        over = [
-            (float(v.f.max(initial=0.0)), g.criterion.unstable_tolerance)
-            for g, v in zip(self.cracks, self._values, strict=True)
-            if v.f.max(initial=0.0) >= g.criterion.release_range[0]
-        ]
-        return all(t is not None and f <= 1.0 + t for f, t in over)
-
+# -- controlled opening ----------------------------------------------------------------------------
 
 SAME_OPENING = 1e-9
 """Openings that differ by less than this part of them are the same."""
@@ -332,8 +258,8 @@ class OpeningControl:
     """The controlled opening of a step.
 
     Args:
-        model: The bodies, with their monitors.
-        cracks: Activated debonds.
+        solver: The solver, with its monitors.
+        cracks: Active cracks.
         names: Name of a monitor, or of two of which the opening is the first less the second.
 
     Attributes:
@@ -341,11 +267,11 @@ class OpeningControl:
         opening: Opening at the last onset, length.
 
     Raises:
-        InputError: No monitor has that name, faces rub, or bonds soften.
+        InputError: No monitor has that name, faces have friction, or bonds are cohesive.
     """
 
     def __init__(self, solver: Solver, cracks: Sequence[Crack], names: Sequence[str]) -> None:
-        self._model = solver
+        self._solver = solver
         self.name = " - ".join(names)
         self.opening = 0.0
         titles = [m.title for m in solver.monitors]
@@ -362,8 +288,9 @@ class OpeningControl:
         for g in cracks:
             if g.opening_driven:
                 raise InputError(
-                    f"interface '{g.title}' lets go progressively with its opening, which "
-                    "stepping='opening' does not have; release by Step, or prescribe displacements"
+                    f"interface '{g.title}' is released progressively with its opening, which "
+                    "stepping='opening' does not have; use StepRelease(), or prescribe "
+                    "displacements"
                 )
 
     @property
@@ -373,7 +300,7 @@ class OpeningControl:
 
     def excess(self, state: Equilibrium) -> float:
         """What the opening of a state has over that of the last onset, length."""
-        values = self._model.system.monitors(state)[: len(self._weight)]
+        values = self._solver.system.monitors(state)[: len(self._weight)]
         return float(self._weight @ values) - self.opening
 
     def reach(self, state: Equilibrium) -> None:

@@ -1,4 +1,4 @@
-"""Quasi-static growth: what the user may say about a step."""
+"""Quasi-static and dynamic steps: the controls a user may give."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ class Static:
             above; "path" keeps the load factor of a proportional load on the equilibrium path at
             f = 1, also where that means unloading (snap-back under load control); "opening" finds
             the load factor of a proportional load from a monitored displacement that never falls:
-            after nodes have let go the load falls until the opening is what it was, and nodes
-            whose f is still 1 or more go at the same opening. Not with friction.
+            after a release the load falls until the opening is what it was, and nodes whose f is
+            still 1 or more are released at the same opening. Not with friction.
         opening: With stepping="opening", the name of the monitor that is controlled, or of two of
             which it is the first less the second, e.g. both faces at the crack mouth. It must grow
             with the load.
@@ -100,7 +100,7 @@ class Dynamic(Static):
     """A step in real time, for a scene with :class:`fxcrack.Inertia`.
 
     Increments of the time step; an increment in which f overshoots 1 + tolerance is cut back and
-    the time step grows back afterwards. Bonds that let go lose their force over the next increment.
+    the time step grows back afterwards. Released bonds lose their force over the next increment.
 
     Args:
         dt: Time step, time; sets ``initial`` and ``maximum``.

@@ -608,7 +608,7 @@ SCENES: dict[str, Golden] = {
     ),
     "newton_progressive": Golden(
         "progressive release of linear bodies by the nonlinear solver",
-        lambda comm: beam(comm, release=fx.ProgressiveRelease(), path="newton"),
+        lambda comm: beam(comm, release=fx.ProgressiveRelease(), solver="newton"),
         until(3),
     ),
     "two_interfaces": Golden(

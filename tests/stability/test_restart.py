@@ -228,7 +228,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
         [fx.Static(until=fx.Releases(3), initial=0.1, maximum=0.1, **INCREMENTS)],
     ),
     "nonlinear path, progressive": (
-        lambda comm: short(comm, fx.ProgressiveRelease(), path="newton"),
+        lambda comm: short(comm, fx.ProgressiveRelease(), solver="newton"),
         [fx.Static(until=fx.Releases(4))],
     ),
     "inertia, finite strain": (

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import dolfinx.mesh
@@ -27,10 +26,7 @@ from fxcrack.continuum.stress import von_mises
 from fxcrack.interface.surface import facet_nodes
 from fxcrack.output.fields import displacement_function, stress_function
 from fxcrack.output.plots.style import GREY, INK, colour_bar, dress, new_figure, save
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
 TIMES = "\N{MULTIPLICATION SIGN}"
 
@@ -77,11 +73,11 @@ def _facet_kind(continuum: Continuum) -> str:
     return {"tetrahedron": "triangle", "hexahedron": "quadrilateral"}.get(name, "interval")
 
 
-def shape(scene: Scene, component: str = "von_mises") -> Shape:
+def shape(source: Analysis | HasAnalysis, component: str = "von_mises") -> Shape:
     """Gather what a picture of the deformed mesh shows; collective, one back-solve.
 
     Args:
-        scene: The scene, after a step.
+        source: A scene or its analysis, after a step.
         component: "von_mises" or one of ``scene.continuum.model.stress_labels``.
 
     Returns:
@@ -90,12 +86,13 @@ def shape(scene: Scene, component: str = "von_mises") -> Shape:
     Raises:
         InputError: The component is unknown, or no step was run yet.
     """
-    continuum, comm = scene.continuum, scene.mesh.comm
+    analysis = analysis_of(source)
+    continuum, comm = analysis.continuum, analysis.comm
     labels = list(continuum.model.stress_labels)
     if component != "von_mises" and component not in labels:
         unknown_name("stress component", component, ["von_mises", *labels])
-    u = displacement_function(scene)
-    stress = stress_function(scene, u, scene.time)
+    u = displacement_function(analysis)
+    stress = stress_function(analysis, u, analysis.time)
     if component == "von_mises":
         values = _per_cell(von_mises(continuum, stress), 1)[:, 0]
     else:
@@ -159,12 +156,12 @@ def view_axes(up: Array, along: Array, azimuth: float, elevation: float) -> Arra
     return np.stack([right, np.cross(towards, right), towards])
 
 
-def _upright(scene: Scene) -> tuple[Array, Array]:
+def _upright(analysis: Analysis) -> tuple[Array, Array]:
     """Up across the first interface, right along the longest of the other axes."""
     size = np.zeros(3)
     normal = np.array([0.0, 0.0, 1.0])
-    if scene.pairs:
-        surface = scene.pairs[0].surface
+    if analysis.pairs:
+        surface = analysis.pairs[0].surface
         normal = np.abs((surface.normals * surface.areas[:, None]).sum(axis=0))
         size = np.ptp(surface.x, axis=0)
     up = int(np.argmax(normal))
@@ -173,7 +170,7 @@ def _upright(scene: Scene) -> tuple[Array, Array]:
 
 
 def deformed(
-    scene: Scene,
+    source: Analysis | HasAnalysis,
     path: str | Path,
     *,
     scale: float | None = None,
@@ -185,7 +182,7 @@ def deformed(
     """Plot the deformed mesh coloured by a stress; collective, one back-solve.
 
     Args:
-        scene: The scene, after a step.
+        source: A scene or its analysis, after a step.
         path: Picture file (.png, .pdf, .svg).
         scale: Factor on displacements; chosen by itself if ``None`` and named in the picture.
         component: "von_mises" or a component of the stress, e.g. "xx".
@@ -197,8 +194,9 @@ def deformed(
         InputError: The component is unknown, or no step was run yet.
         FxcrackError: The file could not be written.
     """
-    data = shape(scene, component)
-    flat = scene.mesh.gdim == 2
+    analysis = analysis_of(source)
+    data = shape(analysis, component)
+    flat = analysis.mesh.gdim == 2
 
     def draw() -> Figure:
         factor = automatic_scale(data) if scale is None else scale
@@ -209,7 +207,7 @@ def deformed(
         if flat:
             points, border = moved[..., :2], data.border[..., :2]
         else:
-            axes = view_axes(*_upright(scene), *view)
+            axes = view_axes(*_upright(analysis), *view)
             points, colours = _project(moved, data.inner + factor * data.motion.mean(axis=1),
                                        axes, colours)  # fmt: skip
             border = np.zeros((0, 2, 2))
@@ -245,7 +243,7 @@ def deformed(
         colour_bar(figure, ax, mapping, label or words, below=low_and_wide, extend=extend)
         return figure
 
-    save(scene.mesh.comm, path, draw)
+    save(analysis.comm, path, draw)
 
 
 def _colours(values: Array, *, signed: bool) -> tuple[Normalize, str, str]:

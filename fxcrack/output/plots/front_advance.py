@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -18,10 +18,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.interface.pairing import Interface
 from fxcrack.output.plots.style import GREY, INK, LIGHT, colour_bar, dress, new_figure, save
-
-if TYPE_CHECKING:
-    from fxcrack.scene import Scene
-
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
 _INITIAL = "#c3c9d3"
 _SEAMLESS: dict[str, Any] = {"linewidths": 0.3, "edgecolors": "face"}
@@ -63,24 +60,25 @@ class ReleaseMap:
 
 
 def release_map(
-    scene: Scene,
+    source: Analysis | HasAnalysis,
     interface: Interface | str,
     released: Sequence[tuple[int, float]] | None = None,
 ) -> ReleaseMap:
     """Where and when the nodes of an interface were released.
 
     Args:
-        scene: A scene in three dimensions.
+        source: A scene in three dimensions, or its analysis.
         interface: Interface or its name.
         released: Slave node and time of each release, in order; those of the scene by default.
 
     Raises:
         InputError: The interface is unknown, or a line.
     """
+    analysis = analysis_of(source)
     title = interface if isinstance(interface, str) else interface.title
-    pair = next((p for p in scene.pairs if p.title == title), None)
+    pair = next((p for p in analysis.pairs if p.title == title), None)
     if pair is None:
-        unknown_name("interface", title, [p.title for p in scene.pairs])
+        unknown_name("interface", title, [p.title for p in analysis.pairs])
     surface = pair.surface
     if surface.dim == 1:
         raise InputError(
@@ -91,7 +89,7 @@ def release_map(
     across = [i for i in range(3) if i != int(np.argmax(normal))]
     across.sort(key=lambda i: -float(np.ptp(surface.x[:, i])))
     if released is None:
-        released = [r for g in scene.cracks if g.title == title for r in g.released]
+        released = [r for g in analysis.cracks if g.title == title for r in g.released]
     order = np.where(pair.bonded, np.inf, 0.0)
     order[[node for node, _ in released]] = 1.0 + np.arange(len(released))
     pieces = np.concatenate([surface.facets[:, p] for p in _PIECES[surface.kind, surface.order]])
@@ -120,7 +118,7 @@ def _around(data: ReleaseMap) -> tuple[Array, Array]:
 
 
 def front_advance(
-    scene: Scene,
+    source: Analysis | HasAnalysis,
     path: str | Path,
     interface: Interface | str,
     *,
@@ -133,7 +131,7 @@ def front_advance(
     """Plot an interface from above, coloured by when it opened, with fronts in between; collective.
 
     Args:
-        scene: A scene in three dimensions.
+        source: A scene in three dimensions, or its analysis.
         path: Picture file (.png, .pdf, .svg).
         interface: Interface or its name.
         released: Slave node and time of each release, in order; those of the scene by default.
@@ -148,7 +146,7 @@ def front_advance(
     """
     if colour not in ("order", "time"):
         raise InputError(f"front_advance: colour = '{colour}', choose 'order' or 'time'")
-    data = release_map(scene, interface, released)
+    data = release_map(source, interface, released)
 
     def draw() -> Figure:
         low, high = _around(data)
@@ -190,4 +188,4 @@ def front_advance(
         )  # fmt: skip
         return figure
 
-    save(scene.mesh.comm, path, draw)
+    save(analysis_of(source).comm, path, draw)

@@ -1,0 +1,104 @@
+"""Rows of the history: the present state of an analysis in numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fxcrack.history import Row
+from fxcrack.solvers.base import Solver
+from fxcrack.steps.analysis import Analysis
+
+Observer = Callable[[str, Row], None]
+"""Called on all ranks with the name of every event and its row of the history."""
+
+
+class Recorder:
+    """Adds rows to the history of an analysis.
+
+    Args:
+        analysis: The analysis.
+        observer: Called with every row.
+        columns: Further columns of every row.
+    """
+
+    def __init__(
+        self,
+        analysis: Analysis,
+        observer: Observer | None = None,
+        columns: Callable[[], Row] | None = None,
+    ) -> None:
+        self._analysis = analysis
+        self._observer = observer
+        self._columns = columns
+
+    def __call__(self, event: str) -> None:
+        """Add a row of the present state and show it to the observer; collective."""
+        analysis = self._analysis
+        row = history_row(analysis, event)
+        for g, v in analysis.at_tips():
+            g.look_for_overlap(v.tips, analysis.solver.state)
+        if self._columns is not None:
+            row |= self._columns()
+        analysis.history.append(row)
+        if self._observer is not None:
+            self._observer(event, row)
+
+
+def load_columns(solver: Solver) -> list[tuple[str, str, bool]]:
+    """Columns of each support component and force pattern, in the order of ``state.loads``.
+
+    Returns:
+        Name of the prescribed displacement or load factor, name of the reaction or of the
+        displacement conjugate to it, and whether the first one ever differs from zero.
+    """
+    names = [(f"u[{c.title}]", f"R[{c.title}]", c.moves) for c in solver.supports.columns]
+    return names + [(f"F[{x.title}]", f"v[{x.title}]", True) for x in solver.loads]
+
+
+def history_row(analysis: Analysis, event: str) -> Row:
+    """Loads, reactions, cracks, criteria and energies of the present state; collective.
+
+    Args:
+        analysis: The analysis, its tip values up to date.
+        event: Name of the event.
+
+    Returns:
+        The columns that :mod:`fxcrack.history` lists.
+    """
+    solver, balance = analysis.solver, analysis.balance
+    state, system = solver.state, solver.system
+    stored, spent = solver.stored(state), solver.spent()
+    work = balance.external_work + solver.extra_work(state)
+    row: Row = {"time": float(balance.time), "event": event}
+    for (load, answer, moves), a, r in zip(
+        load_columns(solver), state.loads, state.conjugate, strict=True
+    ):
+        if moves:
+            row[load] = float(a)
+        row[answer] = float(r)
+    # displacements that criteria follow come after those of the user
+    for monitor, value in zip(solver.monitors, system.monitors(state), strict=False):
+        row[f"m[{monitor.title}]"] = float(value)
+    for g, v in analysis.at_tips():
+        row[f"a[{g.title}]"] = g.extent.length(v.tips)
+        row[f"area[{g.title}]"] = g.extent.area(v.tips)
+        row[f"released[{g.title}]"] = g.n_released
+        if len(v.tips):
+            i = v.largest
+            row[f"f[{g.title}]"] = float(v.f[i])
+            for name, quantity in v.report.items():
+                row[f"{name}[{g.title}]"] = float(quantity[i])
+            row[f"node[{g.title}]"] = int(v.tips.node[i])
+    row |= stored
+    row["external_work"] = work
+    row["released_energy"] = balance.released - balance.viscous
+    if balance.viscous:
+        row["viscous_energy"] = balance.viscous
+    if system.soft.bonds or system.soft.finished:
+        row["snap_energy"] = analysis.snap_energy
+    if system.friction is not None:
+        row["friction_energy"] = solver.friction_energy
+    row |= spent
+    gone = balance.released + solver.friction_energy + sum(spent.values())
+    row["balance"] = work - sum(stored.values()) - gone
+    return row
