@@ -46,7 +46,7 @@ def fingerprint(scene: Scene, step: Any, grow: list[bool]) -> dict[str, Any]:
             growth = scene.cracks[p]
             debond = growth.debond
             parts["criterion"] = plain(debond.criterion)
-            parts["toughness"] = plain(getattr(growth.evaluator, "toughness", None))
+            parts["toughness"] = plain(growth.evaluator.toughness)
             parts["release"] = plain(debond.release)
             parts["watch"] = plain(list(debond.watch))
             parts["grows"] = grow[p]
