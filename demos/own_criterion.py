@@ -16,11 +16,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 import fxcrack as fx
-from fxcrack.demos.show import table
+from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_2d
 
 E, GIC, GIIC = 70e3, 0.2, 0.6
@@ -57,14 +58,18 @@ def run(criterion, dx=0.5, length=100.0, solver=None, release=fx.StepRelease(), 
     return history, [row for row in history if row["event"] == "onset"]
 
 
-def main() -> None:
-    (_, own), (_, vcct) = run(StressIntensity(K_c=np.sqrt(E * GIC))), run(fx.VCCT(GIC))
-    loads = [(a["R[pin_top.y]"], b["R[pin_top.y]"]) for a, b in zip(own, vcct, strict=True)]
-    table("load at growth / N", ["own criterion", "VCCT"], loads)
-    first = run(fx.VCCT(GIC, GIIC, mix=ellipse))[1][0]
-    found = first["GI[bond]"] + first["GII[bond]"]
-    table("G_T", ["FE", "theory"], [(found, 7.0 * GIC / np.hypot(4.0, 3.0 * GIC / GIIC))])
+def main(out: Path, fine: bool = False) -> None:
+    criteria = StressIntensity(np.sqrt(E * GIC)), fx.VCCT(GIC), fx.VCCT(GIC, GIIC, mix=ellipse)
+    (own, _), (vcct, _), (_, mixed) = (run(c, 0.25 if fine else 0.5) for c in criteria)
+    own.to_csv(out / "own_criterion.csv")
+    rows = zip(own["R[pin_top.y]"], vcct["R[pin_top.y]"], strict=True)
+    table("load / N", ["own criterion", "VCCT"], list(rows))
+    total, theory = (
+        mixed[0]["GI[bond]"] + mixed[0]["GII[bond]"],
+        7.0 / np.hypot(4.0, 3 * GIC / GIIC),
+    )
+    table("G_T/G_Ic", ["FE", "theory"], [(total / GIC, theory)])
 
 
 if __name__ == "__main__":
-    main()
+    main(*arguments(__doc__, "out/own_criterion"))

@@ -354,7 +354,7 @@ def test_one_toughness_needs_no_law(mix: Any) -> None:
 
 def test_windows() -> None:
     assert VCCT(0.2).release_range == (1.0, 1.2)
-    assert not VCCT.allows_normal_only
+    assert not VCCT(0.2).allows_normal_only
 
 
 def test_enhanced_vcct_has_two_toughnesses() -> None:

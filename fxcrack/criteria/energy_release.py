@@ -231,6 +231,8 @@ class RateEvaluator(SofteningEvaluator):
             edges, and f is that of the edge.
     """
 
+    toughness: Array
+
     def __init__(
         self,
         probe: FrontProbe,

@@ -54,11 +54,14 @@ class Evaluator(Protocol):
         ahead: Distance ahead of a tip whose bond forces are needed, length.
         behind: Distance behind a tip whose openings are needed, length.
         ends: Time after which nothing grows any more.
+        toughness: Toughness by mode of the slave nodes when the analysis begins, shape (n_nodes, 3)
+            [force/length], so that a restart knows another one; None without.
     """
 
     ahead: float = 0.0
     behind: float = 0.0
     ends: float = float("inf")
+    toughness: Array | None = None
 
     @property
     def degree(self) -> float | None:

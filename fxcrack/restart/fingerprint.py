@@ -44,7 +44,7 @@ def fingerprint(analysis: Analysis, step: Any, grow: list[bool]) -> dict[str, An
             crack = analysis.cracks[p]
             debond = crack.debond
             parts["criterion"] = plain(debond.criterion)
-            parts["toughness"] = plain(getattr(crack.evaluator, "toughness", None))
+            parts["toughness"] = plain(crack.evaluator.toughness)
             parts["release"] = plain(debond.release)
             parts["watch"] = plain(list(debond.watch))
             parts["grows"] = grow[p]
