@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
-from fxcrack.output.plots import curves as plots
+from fxcrack.output import plots
 from fxcrack.output.plots import style as looks
 from fxcrack.output.plots.deformed import Shape, automatic_scale, shape, view_axes
 from fxcrack.output.plots.front_advance import release_map

@@ -103,7 +103,7 @@ class QuasiStaticDriver(LoadPath):
         self._record("end")
         after = {k: v for k, v in self.solver.timings.seconds.items() if k.startswith("factor")}
         inside = sum(after.values()) - sum(before.values())
-        self.solver.timings.add("march", start + inside)
+        self.solver.timings.add("growth", start + inside)
         return reason
 
     def _run_events(self) -> str:
