@@ -24,7 +24,7 @@ KEYS = {
     *("dofs", "window", "releases", "factorizations", "ranks", "seconds", "compile", "curve"),
     *("peak_memory_mb", "peak_memory_plain_mb", "ratio_to_one_solve"),
 }
-SECONDS = {"assemble", "plain_factor", "one_solve", "factor_with_schur", "march", "total"}
+SECONDS = {"assemble", "plain_factor", "one_solve", "factor_with_schur", "growth", "total"}
 
 
 @cache

@@ -219,7 +219,7 @@ def test_tables() -> None:
     result = measured()
     for c in result["cases"]:
         if "failed" not in c:
-            c["seconds"] |= {"total": 10.0, "march": 0.0}
+            c["seconds"] |= {"total": 10.0, "growth": 0.0}
             c["bytes_per_dof"] = 1e6 * c["memory_mb"] / c["dofs"]
     text = io.StringIO()
     show_scale(result, Console(file=text, width=150))

@@ -2,7 +2,7 @@
 
 Each cell shape and order is run with the base way to find G, each other way to find G with the base
 cell. Increments and solvers are run with the base of all else on the second and third coarsest
-size, ranks with the base cell and way on the two finest: where they can tell something.
+size, ranks with the base cell and way on the two finest: where they make a difference.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Runs settings in processes of their own, under time limits: whatever they do, nothing hangs.
+"""Runs settings in processes of their own, under time limits, so that a study never hangs.
 
 A worker serves all settings with the same number of ranks, so that Python starts once for them. One
-that dies, takes too long or fails on one of several ranks is ended with all its ranks, and the next
+that ends, takes too long or fails on one of several ranks is ended with all its ranks, and the next
 setting gets a new one.
 """
 
@@ -72,7 +72,7 @@ class _Worker:
             self.process.stdin.write(json.dumps(setting.as_dict()).encode() + b"\n")
             self.process.stdin.flush()
         except OSError as error:
-            raise SettingFailed(f"the worker is gone: {self._last_words()}") from error
+            raise SettingFailed(f"the worker has ended: {self._last_error_line()}") from error
         answer = self._answer(limit)
         if "error" in answer:
             raise Refused(str(answer["error"]))
@@ -101,17 +101,17 @@ class _Worker:
                 if wait.select(left):
                     piece = stream.read()
                     if piece == b"":
-                        raise SettingFailed(f"its process ended: {self._last_words()}")
+                        raise SettingFailed(f"its process ended: {self._last_error_line()}")
                     self._buffer += piece or b""
 
-    def _last_words(self) -> str:
+    def _last_error_line(self) -> str:
         """The last line the worker wrote to its standard error."""
         self.log.seek(0)
         lines = [w.strip() for w in self.log.read().decode(errors="replace").splitlines()]
-        return next((w for w in reversed(lines) if w), "it said nothing")
+        return next((w for w in reversed(lines) if w), "it wrote nothing")
 
     def end(self) -> None:
-        """End all ranks, gently if they listen."""
+        """End all ranks: by the end of input, then by signals."""
         if self.process.stdin is not None:
             with contextlib.suppress(OSError):
                 self.process.stdin.close()

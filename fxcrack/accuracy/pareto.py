@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 GAIN = 0.05
-"""Share of the error that a dearer setting must save to be on the front."""
+"""Share of the error that a costlier setting must save to be on the front."""
 NOISE = 0.1
 """Share of a time that repeated measurements differ by."""
 TARGETS = (0.05, 0.01, 0.001)
@@ -27,7 +27,7 @@ def pareto_front(seconds: npt.ArrayLike, errors: npt.ArrayLike, *, gain: float =
     Args:
         seconds: Cost of each point, shape (n,).
         errors: Error of each point, shape (n,).
-        gain: Share of the error that a dearer point must save.
+        gain: Share of the error that a costlier point must save.
     """
     t, e = np.asarray(seconds, dtype=float), np.asarray(errors, dtype=float)
     best, out = np.inf, []
@@ -46,7 +46,7 @@ def cheapest(seconds: npt.ArrayLike, errors: npt.ArrayLike, target: float) -> in
 
     Args:
         seconds: Cost of each point, shape (n,).
-        errors: Error of each point, its uncertainty included, shape (n,); the plainest first.
+        errors: Error of each point, its uncertainty included, shape (n,); the simplest first.
         target: Largest error, relative.
     """
     t, e = np.asarray(seconds, dtype=float), np.asarray(errors, dtype=float)

@@ -34,7 +34,7 @@ _PHASES = {
     "assemble": "assembly",
     "transform": "jump coordinates",
     "factor": "factorisation with S",
-    "march": "crack growth on S",
+    "growth": "crack growth on S",
 }
 _FLOOR = 1e-6  # errors below are drawn there
 

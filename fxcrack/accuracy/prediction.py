@@ -91,11 +91,11 @@ def plan(
         waiting: Settings not yet run.
         done: Seconds of what has been run.
         remaining: Seconds left.
-        extra: Seconds on the wall for a setting and its predicted seconds, e.g. with repeats.
+        extra: Wall-clock time of a setting and its predicted seconds, s, e.g. with repeats.
 
     Returns:
-        The setting and its predicted seconds on the wall; ``None`` if nothing fits, with those of
-        the cheapest (infinite if nothing waits).
+        The setting and its predicted wall-clock time, s; ``None`` if nothing fits, with the time
+        of the cheapest (infinite if nothing waits).
     """
     best, seconds = None, np.inf
     for setting in waiting:

@@ -22,7 +22,7 @@ _PHASES = {
     "set up": ("setup",),
     "K, T": ("assemble", "transform"),
     "factor": ("factor", "multigrid", "columns"),
-    "growth": ("march",),
+    "growth": ("growth",),
 }
 _HEADINGS = ("setting", "size", "dofs", "seconds", *_PHASES, "MB")
 _WIDTH = 136  # characters of the table where the terminal is not at least as wide
@@ -58,7 +58,7 @@ def show(result: Result, console: Console) -> None:
 
 
 def _rows(result: Result, names: list[str]) -> list[tuple[bool, list[str]]]:
-    """Rows of the table from cheap to dear, whether each is on the front."""
+    """Rows of the table from cheap to costly, whether each is on the front."""
     rows = []
     for record in sorted(result["records"], key=lambda r: r["seconds"]):
         setting = Setting(**record["setting"])
@@ -120,9 +120,9 @@ def notes(result: Result) -> list[str]:
             "No result: " + "; ".join(f"{f['name']} ({f['why']})" for f in result["failed"]) + "."
         )
     if result["left_out"]:
-        dear = sorted(result["left_out"], key=lambda s: s["predicted_seconds"])
-        some = ", ".join(f"{s['name']} ({duration(s['predicted_seconds'])})" for s in dear[:4])
-        more = f" and {len(dear) - 4} more" if len(dear) > 4 else ""
+        costly = sorted(result["left_out"], key=lambda s: s["predicted_seconds"])
+        some = ", ".join(f"{s['name']} ({duration(s['predicted_seconds'])})" for s in costly[:4])
+        more = f" and {len(costly) - 4} more" if len(costly) > 4 else ""
         lines.append(
             f"Left out for the budget of {result['budget']:g} s, with predicted seconds: "
             f"{some}{more}."

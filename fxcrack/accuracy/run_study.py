@@ -1,7 +1,7 @@
 """A study from its name to the numbers that are reported, as plain types for JSON.
 
-Settings run from cheap to dear; their cost is predicted from what was measured, and the study ends
-before its budget does. What was left out is part of the result.
+Settings run from cheap to costly; their cost is predicted from what was measured, and the study
+ends before its budget does. What was left out is part of the result.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def run_study(
         budget: Seconds of wall-clock time for all runs together.
         sizes: Element sizes instead of the study's own (length).
         measure: "worst" of load, G and crack length, or the name of one quantity measured.
-        tell: Told about each setting in a line.
+        tell: Called with one line about each setting.
 
     Raises:
         InputError: The study cannot be run as asked.
@@ -169,10 +169,10 @@ def assemble(study: Study, records: list[tuple[Setting, Result]], measure: str) 
         measure: As for :func:`run_study`.
 
     Raises:
-        InputError: Nobody measured the quantity asked for.
+        InputError: The quantity asked for was not measured.
     """
-    plainest = {setting: i for i, setting in enumerate(settings(study))}
-    records = sorted(records, key=lambda record: plainest[record[0]])
+    simplest = {setting: i for i, setting in enumerate(settings(study))}
+    records = sorted(records, key=lambda record: simplest[record[0]])
     values = [(setting, found["values"]) for setting, found in records]
     measured = sorted({name for _, v in values for name in v})
     if measure != "worst" and measure not in measured:

@@ -35,7 +35,7 @@ REPEATS = 3
 SHORT = 0.5
 """The limit, seconds."""
 _COMPILED = 0.05  # seconds: forms found compiled take milliseconds
-_NAP = 0.002  # seconds between two looks for a message: waiting ranks leave the cores to others
+_POLL = 0.002  # seconds between two looks for a message: waiting ranks leave the cores to others
 _PATIENCE = 1.0  # seconds a failed rank waits for the others to fail too
 _TAG = 7
 
@@ -94,8 +94,8 @@ def run_once(study: Study, setting: Setting, comm: MPI.Intracomm, *, memory: boo
         seconds[key] = seconds.get(key, 0.0) + value
     total = made - begin + end - ran - compiled
     left = total - sum(seconds.values())
-    if left < 0.0 and "march" in seconds:
-        seconds["march"] += left  # columns of S found on the way count as columns
+    if left < 0.0 and "growth" in seconds:
+        seconds["growth"] += left  # columns of S computed during growth count as columns
     seconds["other"] = max(left, 0.0)
     case.scene.close()
     theory = case.theory
@@ -135,7 +135,7 @@ def run(study: Study, setting: Setting, comm: MPI.Intracomm) -> Result:
 
 
 def _next(comm: MPI.Intracomm, parent: int) -> dict[str, Any] | None:
-    """The next setting, on all ranks; ``None`` at the end. Nobody spins meanwhile."""
+    """The next setting, on all ranks; ``None`` at the end. Waiting ranks sleep."""
     if comm.rank == 0:
         text = sys.stdin.readline()
         request: dict[str, Any] | None = json.loads(text) if text.strip() else None
@@ -144,8 +144,8 @@ def _next(comm: MPI.Intracomm, parent: int) -> dict[str, Any] | None:
         return request
     while not comm.Iprobe(source=0, tag=_TAG):
         if os.getppid() != parent:
-            os._exit(1)  # whoever started this is gone
-        time.sleep(_NAP)
+            os._exit(1)  # the parent process has ended
+        time.sleep(_POLL)
     received: dict[str, Any] | None = comm.recv(source=0, tag=_TAG)
     return received
 
@@ -153,20 +153,20 @@ def _next(comm: MPI.Intracomm, parent: int) -> dict[str, Any] | None:
 def main() -> None:
     """Serve until the input ends.
 
-    After an error on several ranks whoever reads the answers ends them all: where some of them hang
-    nothing else would, and an abort from here may overtake the answer.
+    After an error on several ranks the parent process, which reads the answers, ends them all: some
+    of them may wait for ever, and an abort from here may overtake the answer.
     """
     comm = MPI.COMM_WORLD
     failures = comm.Dup()  # collectives of failed ranks do not mix with those of the others
     answers = os.fdopen(os.dup(1), "w")
-    os.dup2(2, 1)  # whatever libraries print must not mix with the answers
+    os.dup2(2, 1)  # the output of libraries must not mix with the answers
     parent = os.getppid()
     study = load(sys.argv[1])
     gc.collect()
     gc.freeze()  # collections between runs need not visit what the imports made
     if comm.rank == 0:
         print(MARK + json.dumps({"ready": fxcrack.__version__}), file=answers, flush=True)
-    torn = False
+    unequal = False
     while (request := _next(comm, parent)) is not None:
         answer: dict[str, Any]
         try:
@@ -176,9 +176,9 @@ def main() -> None:
         if comm.rank == 0 or ("error" in answer and not all_arrive(failures, _PATIENCE)):
             print(MARK + json.dumps(answer), file=answers, flush=True)
         if comm.rank == 0 and "error" in answer:
-            torn = not all_arrive(failures, _PATIENCE)
+            unequal = not all_arrive(failures, _PATIENCE)
         gc.collect()
-    if torn:
+    if unequal:
         comm.Abort(1)
 
 

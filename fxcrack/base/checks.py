@@ -1,4 +1,4 @@
-"""Checks of what kind of thing an argument is, with messages for the usual slips."""
+"""Checks of what kind of thing an argument is, with messages for the usual mistakes."""
 
 from __future__ import annotations
 

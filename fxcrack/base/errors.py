@@ -1,6 +1,6 @@
 """One exception family, and the means to raise the same exception on every rank together.
 
-Every message says what is wrong, where, and how to mend it.
+Every message says what is wrong, where, and how to correct it.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 
 class FxcrackError(Exception):
-    """Base of everything fxcrack raises on purpose."""
+    """Base of all errors that fxcrack raises itself."""
 
 
 class InputError(FxcrackError, ValueError):
@@ -37,7 +37,7 @@ class ConvergenceError(SolverError):
 
 
 class ComesApart(ConvergenceError):
-    """Bonds open without end: the load exceeds what is left of the interface."""
+    """Total separation: the load exceeds what the remaining interface carries."""
 
 
 def raise_on_all_ranks(

@@ -1,8 +1,8 @@
-"""Ctrl-C and SIGTERM: the analysis stops where it rests, with all that is known on disk.
+"""Ctrl-C and SIGTERM: the analysis stops in equilibrium, with all results so far on disk.
 
-The signal is only noted; whoever marches asks at the next accepted increment or release, on all
-ranks together, and raises :class:`Interrupted`. A thread ends the process when that takes longer
-than some seconds (a long factorisation): what was written before is whole in any case.
+The signal is only noted; the driver of the step asks at the next accepted increment or release, on
+all ranks together, and raises :class:`Interrupted`. A thread ends the process when that takes
+longer than some seconds (a long factorisation): what was written before is whole in any case.
 """
 
 from __future__ import annotations

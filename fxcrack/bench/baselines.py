@@ -2,7 +2,7 @@
 
 * refactoring: at each release the matrix with the jumps free by then is factored anew and solved
   once. The ordering and the symbolic factorisation are made once and used again: A keeps all
-  window jumps, the held ones' rows and columns are zeroed.
+  retained jumps; rows and columns of the fixed ones are zeroed.
 * columns: one factorisation of A_II, then one back-solve for each released component gives its
   column of  S = A_WW - A_WI A_II^-1 A_IW; the growth itself runs on S.
 
@@ -32,7 +32,7 @@ from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinate
 from fxcrack.interface.tips import Tips
 from fxcrack.scene import Scene
 
-_TOGETHER = 1.0 - 1e-6  # front nodes this near the largest f go together, as in fxcrack
+_SAME_F = 1.0 - 1e-6  # front nodes this near the largest f are released together, as in fxcrack
 _UNLIMITED_MB = 1e6
 
 
@@ -41,8 +41,8 @@ class Response:
     """Equilibrium at opening 1.
 
     Attributes:
-        jump: Jumps of the window, shape (n_retained,), length.
-        force: Interface forces of the window, shape (n_retained,).
+        jump: Retained jumps, shape (n_retained,), length.
+        force: Interface forces of the retained jumps, shape (n_retained,).
         load: Reaction of the upper arm's end, force.
     """
 
@@ -52,15 +52,15 @@ class Response:
 
 
 class Solver(Protocol):
-    """Finds the equilibrium for given free window components."""
+    """Finds the equilibrium for given free retained components."""
 
     def respond(self, free: Bools) -> Response:
-        """Equilibrium at opening 1 with some window components free, shape (n_retained,)."""
+        """Equilibrium at opening 1 with some retained components free, shape (n_retained,)."""
         ...
 
 
 class Matrices:
-    """A = T^t K T with all jumps the crack may open in the window.
+    """A = T^t K T with all jumps the crack may open retained.
 
     Args:
         problem: Which.
@@ -87,11 +87,11 @@ class Matrices:
 
     @property
     def n_retained(self) -> int:
-        """Number of window components."""
+        """Number of retained components."""
         return self.coordinates.n_retained
 
     def last(self, vector: PETSc.Vec) -> Array:
-        """The window and support entries of a vector, on every rank; collective."""
+        """The entries of retained jumps and supports of a vector, on every rank; collective."""
         out = np.empty(self.coordinates.n_last)
         if self.comm.rank == 0:
             out[:] = vector.array_r[self.coordinates.n_inner :]
@@ -184,7 +184,7 @@ class Columns:
         return len(self._known)
 
     def column(self, c: int) -> Array:
-        """Column c of S over window and supports, shape (n_last,); collective."""
+        """Column c of S over retained jumps and supports, shape (n_last,); collective."""
         if c not in self._known:
             start = time.perf_counter()
             self._unit.set(0.0)
@@ -277,7 +277,7 @@ class Follower:
         self.free[components[components >= 0]] = True
 
     def _vectors(self, nodes: Ints, values: Array) -> Array:
-        """Window values at slave nodes as global vectors, shape (..., 3)."""
+        """Retained values at slave nodes as global vectors, shape (..., 3)."""
         index = self._index[nodes]
         local = np.where(index >= 0, values[np.maximum(index, 0)], 0.0)
         out = np.zeros((*index.shape[:-1], 3))
@@ -298,7 +298,7 @@ class Follower:
         return self._criterion.ratio(rates, self._toughness[tips.node])
 
     def onset(self) -> Onset:
-        """Load until f = 1 and let go; collective."""
+        """Load until f = 1 and release the critical nodes; collective."""
         start = time.perf_counter()
         response = self._solver.respond(self.free)
         tips = self.front.tips()
@@ -306,7 +306,7 @@ class Follower:
         # f grows with the square of the opening, which is never reduced
         self._opening = max(self._opening, 1.0 / float(np.sqrt(f.max())))
         length = self._extent.length(tips)
-        nodes = np.unique(tips.force_nodes[f >= _TOGETHER * f.max()])
+        nodes = np.unique(tips.force_nodes[f >= _SAME_F * f.max()])
         self.front.release(nodes)
         self._free(nodes)
         return Onset(

@@ -1,7 +1,7 @@
 """What an analysis costs: seconds and memory by phase, from laws whose constants were measured.
 
     direct:     t = a n + b n^1.5 (2-D), a n + b n^2 (3-D);   memory  b n log2 n, a n + b n^(4/3)
-                S: c w^2, w components in the window, at most 2 GB of them per factorisation
+                S: c w^2, w retained components, at most 2 GB of them per factorisation
     iterative:  set-up a n; w columns of k iterations, b n each; memory a n + 4 w n bytes
     dense:      c w^2/3 per release, on every rank
     ranks:      t(P) = t(1) / P^g, 2^g what 2 ranks gained; messages of the iteration by latency
@@ -119,7 +119,7 @@ def estimate(
         times = max(math.ceil(math.sqrt(_S_BYTES / _S_MOST) * w), 1)
         part = w / times
         seconds["factorisation"] = times * law(n) * share
-        seconds["window"] = times * c.per_entry[d] * part**2 * share
+        seconds["retained jumps"] = times * c.per_entry[d] * part**2 * share
         memory = {"matrix and factor": memory_law(n), "S": _S_BYTES * part**2 * ranks}
     else:
         setup, law = c.laws["setup_seconds_3"], c.laws["iteration_seconds_3"]

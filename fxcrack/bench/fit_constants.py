@@ -93,7 +93,7 @@ def _base(case: Result) -> float:
 
 
 def _per_entry(cases: list[Result], shape: str) -> float:
-    """Seconds per entry of S: the same model with a large window and a small one."""
+    """Seconds per entry of S: the same model with many and with few retained jumps."""
     of = [c for c in cases if c["shape"] == shape and c["method"] == "schur" and c["ranks"] == 1]
     found = []
     for big in (c for c in of if c["ahead"]):

@@ -1,7 +1,7 @@
 """Measuring one complete crack growth, and the one static solve it is compared with.
 
 The growth: from the mesh in memory to the onset at the last crack length, form compilation apart.
-The solve: A = T^t K T with every bonded jump held at zero, factored by MUMPS' Cholesky method with
+The solve: A = T^t K T with every bonded jump fixed at zero, factored by MUMPS' Cholesky method with
 the workspace of the condensation, and one back-solve; factored once more with its ordering.
 Memory is the highest resident size of a process, summed over the ranks; it counts libraries and
 mesh too, so the solve gets a process of
@@ -93,9 +93,9 @@ def grow(problem: Problem, mesh: Mesh) -> tuple[Growth, Scene]:
     last = history.onset(LENGTHS[-1])
     beyond = end - history.clock[last]
     seconds = {"scene": made - begin}
-    for phase in ("assemble", "transform", "factor_with_schur", "march"):
+    for phase in ("assemble", "transform", "factor_with_schur", "growth"):
         seconds[phase] = scene.solver.timings.seconds[phase]
-    seconds["march"] -= beyond
+    seconds["growth"] -= beyond
     seconds["total"] = end - begin - (compiled - made) - beyond
     seconds = {phase: slowest(comm, value) for phase, value in seconds.items()}
     return Growth(history, last, seconds, slowest(comm, compiled - made), peak_memory(comm)), scene

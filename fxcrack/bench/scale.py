@@ -1,8 +1,8 @@
 """How seconds and memory grow with the size of a model: direct against iterative, 1 rank against 2.
 
-Each case runs in processes of its own: mesh, condensation onto the window a crack needs for its
-first two rows, growth over these rows, one displacement field. Memory is the highest resident size
-less that before the mesh, summed over ranks.
+Each case runs in processes of its own: mesh, condensation onto the jumps that a crack needs for
+its first two rows, growth over these rows, one displacement field. Memory is the highest resident
+size less that before the mesh, summed over ranks.
 
     python -m fxcrack.bench.scale block 20000 iterative 0
 """
@@ -52,7 +52,7 @@ class ScaleCase:
         shape: "block", "plate" or "plane".
         dofs: Wanted number of displacement dofs; the mesh comes near it.
         method: "schur" or "iterative".
-        ahead: Whether the window holds all of the path from a = 30 to 60.
+        ahead: Whether all jumps of the path are retained, from a = 30 to 60.
         ranks: Number of processes.
     """
 
@@ -106,7 +106,7 @@ def _count(name: str, dx: float) -> float:
 def suite(
     sizes: list[float], shapes: list[str], methods: list[str], ranks: list[int]
 ) -> list[ScaleCase]:
-    """Cases for all sizes; several ranks and a large window at the middle size only.
+    """Cases for all sizes; several ranks and many retained jumps at the middle size only.
 
     Without 1 among the ranks all sizes run on each of them, and nothing else. In 2-D the direct
     method alone is measured, at sizes five times as large.
@@ -154,7 +154,7 @@ def measure(case: ScaleCase, comm: MPI.Intracomm) -> Result:
     seconds = {"mesh": clock[1] - clock[0], "scene": clock[2] - clock[1]}
     for phase in ("assemble", "transform", "factor_with_schur", "factor_inner", "multigrid"):
         seconds[phase] = spent.get(phase, 0.0)
-    seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "march", "fields")}
+    seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "growth", "fields")}
     seconds["total"] = end - clock[0] - (clock[3] - clock[2])
     system = scene.solver.system
     assert isinstance(scene.solver, LinearSolver)

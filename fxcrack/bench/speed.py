@@ -28,7 +28,7 @@ _PLAIN = ("plain_factor", "plain_factor_same_order", "one_solve")
 N_RELEASES = 20
 N_COLUMNS = 100
 _PATIENCE = 20.0  # seconds: a baseline that needs no more for the rest is measured whole
-_WAY = (35.0, 55.0)  # crack lengths between which a 3-D growth is compared with beam theory
+_COMPARED = (35.0, 55.0)  # crack lengths between which a 3-D growth is compared with beam theory
 
 Result = dict[str, Any]
 
@@ -90,7 +90,7 @@ def run(
         "peak_memory_plain_mb": memory_of_one_solve(problem, comm) if memory else None,
         "peak_memory_note": (
             "highest resident size from the start of the process to the end of the growth, and of "
-            "a process that makes the mesh, assembles, factors with all bonds held and solves "
+            "a process that makes the mesh, assembles, factors with all bonds fixed and solves "
             "once; Python and libraries included, summed over ranks"
         ),
         "curve": [_point(problem, history, a) for a in LENGTHS],
@@ -139,12 +139,12 @@ def _beside_beam_theory(problem: Problem, growth: Growth) -> Result:
     opening = np.array([problem.opening(r) for r in rows])
     load = np.array([problem.load(r) for r in rows])
     theory = np.array([problem.beam_load(d) for d in opening])
-    between = (a >= _WAY[0]) & (a <= _WAY[1])
+    between = (a >= _COMPARED[0]) & (a <= _COMPARED[1])
     shown = np.unique(np.searchsorted(a, np.arange(LENGTHS[0], LENGTHS[-1] + 1.0, 2.5)))
     keys = ("a", "opening", "load", "beam_load")
     return {
         "mean_load_ratio": float((load / theory)[between].mean()),
-        "between": list(_WAY),
+        "between": list(_COMPARED),
         "note": "load over corrected beam theory at the same opening; a is the mean of the front",
         "curve": [
             dict(zip(keys, (float(x[i]) for x in (a, opening, load, theory)), strict=True))

@@ -18,7 +18,7 @@ _PHASES = {
     "assemble": "assemble K",
     "transform": "T and T^t K T",
     "factor_with_schur": "factorisation with S",
-    "march": "crack growth on S",
+    "growth": "crack growth on S",
     "total": "total, mesh to last onset",
     "plain_factor": "plain factorisation",
     "plain_factor_same_order": "plain factorisation, ordered as with S",

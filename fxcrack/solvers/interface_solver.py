@@ -198,7 +198,7 @@ class InterfaceSolver(ABC):
         self.friction_energy = state.friction_energy
         force = state.values(state.equilibrium.force, self.index, self.system.n_retained)
         self.state = self._equilibrium(state, force)
-        self.timings.add("march", start)
+        self.timings.add("growth", start)
         log.info(
             "factorisation %d: %d retained jumps",
             self.timings.factorizations,

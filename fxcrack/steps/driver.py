@@ -107,7 +107,7 @@ class StepDriver:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
         self.record("end")
-        timings.add("march", start + _seconds_of_factorisations(timings) - factored)
+        timings.add("growth", start + _seconds_of_factorisations(timings) - factored)
         return reason
 
     def _apply_loads(self) -> None:

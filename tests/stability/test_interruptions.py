@@ -527,7 +527,7 @@ def test_a_scene_within_a_folder_of_checkpoints(comm: MPI.Intracomm, shared_path
         second = both()
     for a, b in zip(first, second, strict=True):
         assert a.rows == b.rows  # read, not computed
-        assert "march" not in b.details["seconds"] or b.details["releases"] == len(
+        assert "growth" not in b.details["seconds"] or b.details["releases"] == len(
             [r for r in b if r["event"] == "release"]
         )
     grow_to(dcb(comm, dx=2.0, ny=1), 32.0)  # outside nothing is kept

@@ -46,7 +46,7 @@ def dress(ax: Axes, *, xlabel: str, ylabel: str, title: str | None = None) -> No
 
 
 def legend(ax: Axes, **where: Any) -> None:
-    """A legend without a frame around it, if there is anything to tell."""
+    """A legend without a frame around it, if there is anything to explain."""
     if ax.get_legend_handles_labels()[1] or "handles" in where:
         ax.legend(frameon=False, fontsize=10, labelcolor=INK, **where)
 
