@@ -25,13 +25,13 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.load_vectors import load_vector
-from fxcrack.continuum.loads import constant
+from fxcrack.continuum.loads import Field, constant
 from fxcrack.continuum.neo_hookean import NeoHookeanBodies
 from fxcrack.continuum.weak_form import WeakForm
 
 
 def pressed(
-    comm: MPI.Intracomm, model: str, order: int = 1, value: fx.loads.Field = 3.0, where: str = "x1"
+    comm: MPI.Intracomm, model: str, order: int = 1, value: Field = 3.0, where: str = "x1"
 ) -> tuple[Continuum, WeakForm]:
     continuum = Continuum(box(comm, model), fx.Isotropic(100.0, 0.3), MODELS[model], order=order)
     load = fx.Pressure(where, value, follows=True)

@@ -11,6 +11,7 @@ from specimens import FORCES, HELD_FAR, dcb, grow_to, largest_imbalance, onsets,
 from test_criteria_in_analysis import assert_balanced, plate, run
 
 import fxcrack as fx
+from fxcrack.continuum.loads import Field
 from fxcrack.meshes.dcb import dcb_2d
 
 PRESSED = [fx.Displacement("bottom", x=0.0, y=0.0), fx.Displacement("top", x=0.0, y=-1.0)]
@@ -66,7 +67,7 @@ def test_energy_release_rates_are_not_hurried_so() -> None:
 def test_neutral_growth_goes_on_in_small_increments() -> None:
     """Pure moments: f is the same at every crack length, at last the upper end of its window."""
 
-    def moment(sign: float, y: float) -> tuple[fx.loads.Field, ...]:
+    def moment(sign: float, y: float) -> tuple[Field, ...]:
         return (lambda x: sign * (x[1] - y), 0.0)
 
     loads = [

@@ -309,7 +309,7 @@ def test_round_off_holds_no_body(k: int) -> None:
     """
     found = FOUND["energy out of nothing"]
     history = check(replace(found, upper=(found.upper[0] * (1.0 + k * 1e-15), found.upper[1])))
-    assert history.reason.startswith("total separation: letting the next node go")
+    assert history.reason.startswith("total separation: releasing the next node")
     assert [r["event"] for r in history].count("release") == 1
 
 

@@ -25,7 +25,7 @@ A0 = 20.0
 
 
 def beam(amplitude: Any = None, *, contact: bool = False, **criterion: Any) -> fx.Scene:
-    way = fx.loads.Ramp() if amplitude is None else amplitude
+    way = fx.Ramp() if amplitude is None else amplitude
     return specimen(
         arms(MPI.COMM_SELF),
         a0=A0,
