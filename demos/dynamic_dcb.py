@@ -3,7 +3,8 @@
 # Implicit dynamics with VCCT: the pins of a DCB at rest are torn apart at a constant speed. At
 # 0.1 m/s the crack follows the quasi-static curve. At 8 m/s most of the work goes into the motion
 # of the arms, and the waves in them bring the crack on its way at three quarters of the opening.
-# Bonds let go progressively: a sudden release would shake the arms and tear the next bonds at once.
+# Bonds are released progressively: a sudden release would shake the arms and break the next bonds
+# at once.
 # Units N, mm, s, tonne; plane strain.
 #
 # What must hold, whatever the speed: work of the pins = strain energy + kinetic energy + what the

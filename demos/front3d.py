@@ -1,6 +1,6 @@
-# # Letting a front go in 3-D: step against progressive release
+# # Release of a front in 3-D: step against progressive release
 #
-# With nodal VCCT a node on a staircase front is let go as soon as its own f is 1; letting it go at
+# With nodal VCCT a node on a staircase front is released as soon as its own f is 1; releasing it at
 # once throws away a third of the energy, and the specimen carries 11 to 15 % less than theory.
 # Progressive release lets the node's force fall with its opening so that G_c per area is spent:
 # the front moves through the element, and load and dissipation are right.

@@ -1,6 +1,6 @@
 # # A crack that closes, is pinched by friction, and opens again
 #
-# A plate with a central crack is pulled, pressed, sheared while it is pressed, and let go. While
+# A plate with a central crack is pulled, pressed, sheared while it is pressed, and unloaded. While
 # its faces press with a stress |s| they carry a shear of mu |s|, which works against the slip. In
 # an infinite plate all of the crack slips at once; at its middle
 #
@@ -43,7 +43,7 @@ def closed_form(a: float) -> npt.NDArray[np.float64]:
 def run(
     n_crack: int = 20, width: float = 40.0
 ) -> tuple[fx.Scene, npt.NDArray[np.float64], list[list[Any]]]:
-    """Load, press, shear and let go.
+    """Load, press, shear and unload.
 
     Returns:
         The scene; time, opening and slip at the middle over the load, shape (n, 3); rows of stage,

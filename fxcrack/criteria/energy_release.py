@@ -227,8 +227,8 @@ class RateEvaluator(SofteningEvaluator):
         probe: The interface.
         criterion: Criterion with toughness and mode mix.
         temperature: Temperature of the slave nodes; None without.
-        softens: Whether bonds soften with their opening: second-order fronts then let go by element
-            edges, and f is that of the edge.
+        softens: Whether bonds soften with their opening: second-order fronts are then released by
+            element edges, and f is that of the edge.
     """
 
     toughness: Array
@@ -318,7 +318,7 @@ class RateEvaluator(SofteningEvaluator):
         return units.at_tips(f.reshape(rates.shape[:2])).ravel(), report
 
     def units(self, tips: Tips) -> FrontUnits:
-        """Tips that let go together; of tips that were repeated, those of the first time."""
+        """Tips that are released together; of tips that were repeated, those of the first time."""
         if self._grouped is None or self._grouped[0] is not tips:
             once = np.unique(tips.node).size
             self._grouped = tips, units_of(self._edges, first_tips(tips, once))
@@ -346,9 +346,9 @@ class RateEvaluator(SofteningEvaluator):
         and together they spend what the area of the unit asks for.
 
         Args:
-            nodes: All nodes that let go now, shape (n,).
+            nodes: All nodes that are released now, shape (n,).
             values: What the criterion says at the front they are part of.
-            release: How they let go.
+            release: How they are released.
 
         Raises:
             NotPositiveDefinite: A body would come free: without bound is what its last unit frees.

@@ -1,4 +1,4 @@
-"""An interface that comes apart: criterion, tips, extent, and who is let go."""
+"""A crack: an interface with its criterion, tips and extent, and which nodes are released."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from fxcrack.steps.bond_records import ReleaseRecord, release_records
 from fxcrack.steps.debond import Debond, softens
 
 _TIE = 1e-6
-"""Front nodes whose f lies within this fraction of the largest one are let go together."""
+"""Front nodes whose f lies within this fraction of the largest one are released together."""
 
 _OVERLAP = 1e-2
 """Faces that overlap by less than this fraction of how they move on each other are not told of."""
@@ -41,7 +41,7 @@ class Crack:
 
     Attributes:
         probe: What the criterion asks of the interface.
-        n_released: Nodes let go so far.
+        n_released: Nodes released so far.
         records: What is known of every release, in order.
         paths: Where tips come from.
     """
@@ -78,7 +78,7 @@ class Crack:
         return self.front.tips()
 
     def held(self, tips: Tips) -> bool:
-        """Whether the window holds all that evaluating these tips needs."""
+        """Whether the retained jumps hold all that evaluating these tips needs."""
         if not len(tips):
             return True
         needed = [tips.force_nodes.ravel(), tips.wake_nodes.ravel()]
@@ -86,7 +86,7 @@ class Crack:
         return self.solver.holds(self.p, np.concatenate(needed))
 
     def check_wake(self, tips: Tips) -> None:
-        """Refuse tips whose opening behind cannot be known even in a window made for them.
+        """Refuse tips whose opening behind cannot be known even in a set of retained jumps made for them.
 
         Raises:
             InputError: A support holds the node behind a tip but not its master in the same way.
@@ -146,7 +146,7 @@ class Crack:
         return first_crossing(self.evaluator, values.tips, ends, upward=upward, known=values)
 
     def ready(self, values: TipValues, level: float = 1.0) -> Ints:
-        """Positions of the tips to let go: the critical one and those tied with it."""
+        """Positions of the tips to release: the critical one and those tied with it."""
         if not len(values.f) or values.f.max() < level * (1.0 - 1e-9):
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(values.f >= values.f.max() * (1.0 - _TIE))
@@ -162,7 +162,7 @@ class Crack:
         return softens(self.debond)
 
     def nodes_of(self, values: TipValues, chosen: Ints) -> Ints:
-        """Nodes to let go where some tips are chosen: where bonds soften, by whole units.
+        """Nodes to release where some tips are chosen: where bonds soften, by whole units.
 
         Args:
             values: What the criterion says at the front.
