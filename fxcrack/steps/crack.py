@@ -86,7 +86,7 @@ class Crack:
         return self.solver.holds(self.p, np.concatenate(needed))
 
     def check_wake(self, tips: Tips) -> None:
-        """Refuse tips whose opening behind cannot be known even in a set of retained jumps made for them.
+        """Refuse tips whose opening behind cannot be known with any set of retained jumps.
 
         Raises:
             InputError: A support holds the node behind a tip but not its master in the same way.
