@@ -17,7 +17,7 @@ from fxcrack.demos import own_criterion
 from fxcrack.demos.own_criterion import GIC, GIIC, E, StressIntensity, ellipse
 
 SMALL: dict[str, Any] = {"dx": 1.0, "length": 60.0}
-PATHS = [None, "newton"]
+SOLVERS = [None, "newton"]
 # f = 1 is met to 1e-9 by either path, and loads go with its square root
 SAME = 1e-8
 
@@ -38,10 +38,10 @@ def pair() -> fx.Interface:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("path", PATHS)
-def test_own_criterion_gives_the_loads_of_vcct(path: str | None) -> None:
-    _, own = own_criterion.run(StressIntensity(K_c=np.sqrt(E * GIC)), path=path, **SMALL)
-    _, vcct = own_criterion.run(fx.VCCT(GIC), path=path, **SMALL)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_own_criterion_gives_the_loads_of_vcct(solver: str | None) -> None:
+    _, own = own_criterion.run(StressIntensity(K_c=np.sqrt(E * GIC)), solver=solver, **SMALL)
+    _, vcct = own_criterion.run(fx.VCCT(GIC), solver=solver, **SMALL)
     assert [row["f[bond]"] for row in own] == pytest.approx([1.0] * 6, abs=2e-9)
     assert loads(own) == pytest.approx(loads(vcct), rel=SAME)
     # what the function reports is in the history
@@ -162,9 +162,9 @@ def test_wrong_values_of_f_are_refused(value: Any, words: str) -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("path", PATHS)
-def test_own_mode_mix_law_is_met_where_beam_theory_says(path: str | None) -> None:
-    _, rows = own_criterion.run(fx.VCCT(GIC, GIIC, mix=ellipse), path=path, **SMALL)
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_own_mode_mix_law_is_met_where_beam_theory_says(solver: str | None) -> None:
+    _, rows = own_criterion.run(fx.VCCT(GIC, GIIC, mix=ellipse), solver=solver, **SMALL)
     assert [row["f[bond]"] for row in rows] == pytest.approx([1.0] * 6, abs=2e-9)
     for row in rows:
         on_ellipse = np.hypot(row["GI[bond]"] / GIC, row["GII[bond]"] / GIIC)
@@ -175,10 +175,10 @@ def test_own_mode_mix_law_is_met_where_beam_theory_says(path: str | None) -> Non
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("path", PATHS)
+@pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("release", [fx.StepRelease(), fx.ProgressiveRelease()])
-def test_a_function_is_as_good_as_a_law_of_the_package(path: str | None, release: Any) -> None:
-    options = {"path": path, "release": release, "count": 3, **SMALL}
+def test_a_function_is_as_good_as_a_law_of_the_package(solver: str | None, release: Any) -> None:
+    options = {"solver": solver, "release": release, "count": 3, **SMALL}
     found = [
         own_criterion.run(fx.VCCT(GIC, GIIC, mix=mix), **options)
         for mix in (
