@@ -66,7 +66,7 @@ from fxcrack.steps.static import Dynamic, Static
 if TYPE_CHECKING:
     from fxcrack.output import plots as plots
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _FORMER_NAMES = {
     "OpeningRamp": "RampRelease",
