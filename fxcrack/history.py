@@ -79,7 +79,7 @@ class History:
     def __getitem__(self, column: int) -> Row: ...
 
     def __getitem__(self, column: str | int) -> npt.NDArray[Any] | Row:
-        """A column as an array, NaN where a row lacks it; by a whole number, that row.
+        """A column, shape (n_rows,), NaN where a row lacks it; by a whole number, that row.
 
         Raises:
             InputError: No row has the column.
@@ -152,9 +152,10 @@ class History:
 
         Args:
             path: Picture file (.png, .pdf, .svg).
-            x: Column or array with one value per row; by default the first prescribed
-                displacement that moves, absolute value.
-            y: Column or array; by default the reaction that belongs to it, absolute value.
+            x: Column or array of shape (n_rows,); by default the first prescribed displacement
+                that is not fixed, else the displacement of the first load, absolute value.
+            y: Column or array of shape (n_rows,); by default the reaction or load that belongs to
+                it, absolute value.
             **options: As for :func:`fxcrack.output.plots.curves.load_opening`: reference curves
                 ``[(label, x, y)]``, xlabel, ylabel, label, title.
 

@@ -97,7 +97,7 @@ def _kind(value: Any) -> str:
 
 
 def format_point(point: npt.ArrayLike) -> str:
-    """A point as messages show it; round-off counts as 0."""
+    """A point, shape (dim,), as messages show it; round-off counts as 0."""
     x = np.ravel(point)
     x = np.where(np.abs(x) <= 1e-12 * np.abs(x).max(initial=0.0), 0.0, x)
     return "(" + ", ".join(f"{v:.6g}" for v in x.tolist()) + ")"

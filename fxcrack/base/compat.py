@@ -151,12 +151,16 @@ def geometry_dofmap(domain: dolfinx.mesh.Mesh) -> npt.NDArray[np.int32]:
 
 
 def original_cell_index(domain: dolfinx.mesh.Mesh) -> npt.NDArray[np.int64]:
-    """Position of each local cell among the cells given to :func:`create_mesh`, rank after rank."""
+    """Position of each local cell among the cells given to :func:`create_mesh`, rank after rank.
+
+    Returns:
+        Positions, ghosts included, shape (n_cells,).
+    """
     return np.asarray(domain.topology.original_cell_index)
 
 
 def gmsh_cell_permutation(cell: dolfinx.mesh.CellType, num_nodes: int) -> npt.NDArray[np.intp]:
-    """Array p that brings a cell's gmsh nodes into DOLFINx order: ``nodes[p]``."""
+    """Array p, shape (num_nodes,), that takes gmsh nodes into DOLFINx order: ``nodes[p]``."""
     return np.asarray(dolfinx.cpp.io.perm_gmsh(cell, num_nodes), np.intp)
 
 

@@ -93,7 +93,7 @@ def all_or_none(comm: MPI.Comm, task: str) -> Iterator[None]:
     cause: Exception | None = None
     try:
         yield
-    except Exception as error:  # whatever it is, the other ranks must hear of it
+    except Exception as error:  # any exception must reach the other ranks
         cause = error
     problem = None if cause is None else f"{task}: {type(cause).__name__}: {cause}"
     try:

@@ -46,7 +46,7 @@ class Listener:
     """Context manager that notes SIGINT and SIGTERM instead of letting them end the process.
 
     It takes a signal whose disposition is the default of the system or that of Python, and puts
-    that back at the end. A handler that a program has set stays in charge of its signal, and a
+    that back at the end. A handler that a program has set remains in effect, and a
     signal that is ignored remains so. Outside the main thread it does nothing. A second signal
     ends the process at once.
 
@@ -82,7 +82,7 @@ class Listener:
         return self
 
     def __exit__(self, *error: object) -> None:
-        """Give the signals back."""
+        """Restore the previous signal handlers."""
         self._done.set()
         for number, handler in self._before.items():
             signal.signal(number, handler)

@@ -255,7 +255,10 @@ class Continuum:
         return function
 
     def owned_nodes(self, where: str) -> Ints:
-        """Displacement nodes of a group that this rank owns (local block indices); collective.
+        """Displacement nodes of a group that this rank owns; collective.
+
+        Returns:
+            Local block indices, ascending, shape (n_found,).
 
         Raises:
             InputError: No rank finds a node in the group.

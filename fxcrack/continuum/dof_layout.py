@@ -77,7 +77,7 @@ class DofLayout:
         """Dof of one unknown of each node.
 
         Args:
-            nodes: Nodes in any numbering.
+            nodes: Nodes in any numbering, shape (...,).
             unknown: Which unknown, from 0; of a shape that broadcasts with that of the nodes.
 
         Returns:
@@ -98,7 +98,7 @@ class DofLayout:
         return np.asarray((nodes >= self.first_node) & (nodes < self.first_node + self.n_owned))
 
     def to_local(self, nodes: npt.NDArray[np.integer]) -> Ints:
-        """Numbers on this rank of global nodes that it owns."""
+        """Numbers on this rank of global nodes that it owns, shape of the nodes."""
         return np.asarray(nodes - self.first_node)
 
     def point_maps(self, name: str, nodes: npt.NDArray[np.integer]) -> Array | None:

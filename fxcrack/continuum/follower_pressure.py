@@ -89,11 +89,16 @@ class FollowerPressure(Term):
         self._last_factor = float(self._factor.value)
 
     def work(self) -> float:
-        """Work of the pressure up to the last commit; the same on all ranks."""
+        """Work of the pressure up to the last commit, force x length; the same on all ranks."""
         return self._work
 
     def state(self) -> dict[str, Array]:
-        """Displacement and pressure of the last commit, work so far."""
+        """Displacement and load factor of the last commit, work so far.
+
+        Returns:
+            "last": displacement of the local dofs, ghosts too, shape (n_dofs,), length; "sums":
+            load factor and work (force x length), shape (2,).
+        """
         return {"last": self._last.copy(), "sums": np.array([self._last_factor, self._work])}
 
     def places(self) -> dict[str, Place]:
@@ -101,7 +106,7 @@ class FollowerPressure(Term):
         return {"last": self._continuum.space}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`."""
+        """Set the committed state from :meth:`state`, arrays of the same shapes."""
         self._last[:] = state["last"]
         self._last_factor, self._work = (float(x) for x in state["sums"])
         self._factor.value = self._last_factor

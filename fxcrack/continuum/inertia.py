@@ -261,7 +261,7 @@ class InertiaForces(Term):
             self.velocity.x.array[:] = self._motion(u.x.array)[1]
 
     def commit(self, u: fem.Function) -> None:
-        """Keep the motion; what the forces put in and is no kinetic energy was dissipated."""
+        """Store the motion; work of the forces that is not kinetic energy counts as dissipated."""
         if not self._moving:
             return
         self._moving = False
@@ -298,15 +298,21 @@ class InertiaForces(Term):
         return float(self._continuum.comm.allreduce(value, op=MPI.SUM))
 
     def spent(self) -> dict[str, float]:
-        """Energy taken by Rayleigh damping and by the method up to the last commit.
+        """Energy dissipated by Rayleigh damping and by the method up to the last commit.
 
-        With the work of all other forces by the trapezoidal rule the balance is exact:
+        With the work of all other forces by the trapezoidal rule the energy balance is exact:
         work = kinetic energy + damping energy + numerical dissipation.
         """
         return dict(self._spent)
 
     def state(self) -> dict[str, Array]:
-        """Motion of the last commit and sums."""
+        """Motion of the last commit, dissipated energies and increment length.
+
+        Returns:
+            "u" (length), "v" and "c" (length/time), "a" and "b" (length/time^2): local dofs, ghosts
+            too, each of shape (n_dofs,); "sums": the values of :meth:`spent`, force x length, shape
+            (1,), with Rayleigh damping (2,); "dt": length of the last increment, time, shape (1,).
+        """
         out = {name: value.copy() for name, value in self._last.items()}
         return out | {"sums": np.array(list(self._spent.values())), "dt": np.array([self._dt])}
 
@@ -315,7 +321,11 @@ class InertiaForces(Term):
         return dict.fromkeys(REMEMBERED, self._continuum.space)
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`, with the tangent of its last increment."""
+        """Set the committed state, with the tangent of its last increment.
+
+        Args:
+            state: From :meth:`state`, arrays of the same shapes.
+        """
         self._last = {name: state[name].copy() for name in REMEMBERED}
         self._spent = dict(zip(self._spent, (float(x) for x in state["sums"]), strict=True))
         self._moving = False

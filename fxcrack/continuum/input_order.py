@@ -18,8 +18,8 @@ from dolfinx.mesh import Mesh as Domain
 from fxcrack.base.arrays import Array, Ints
 
 Place: TypeAlias = fem.FunctionSpace | npt.NDArray[np.int32]
-"""Where an array lives: a Lagrange space (as ``x.array`` of its functions, ghosts too), or owned
-cells (the same number of values for each, cell by cell)."""
+"""Where an array is defined: a Lagrange space (as ``x.array`` of its functions, ghosts too), or
+owned cells (the same number of values for each, cell by cell)."""
 
 
 class FileOrder:
@@ -33,14 +33,14 @@ class FileOrder:
         self._comm = compat.plain_comm(domain.comm)
         self._original = compat.original_cell_index(domain)
         self._n_cells = domain.topology.index_map(domain.topology.dim).size_local
-        self._known: list[tuple[Place, Ints]] = []  # a place is itself only
+        self._known: list[tuple[Place, Ints]] = []  # places compare by identity
 
     def gather(self, values: Array, place: Place) -> Array:
         """The whole field on rank 0, shape (n_nodes or n_cells, values of each); collective.
 
         Args:
-            values: Those of this rank.
-            place: Where they live.
+            values: Those of this rank, in the order of ``place``, node by node or cell by cell.
+            place: Where they are defined.
         """
         rows = self._rows_of(place)
         parts = [p for p in self._comm.gather((rows, values)) or [] if len(p[0])]
@@ -56,8 +56,11 @@ class FileOrder:
         """The rows of this rank out of a whole field; collective.
 
         Args:
-            whole: From :meth:`gather`, on every rank.
-            place: Where the values live.
+            whole: From :meth:`gather`, on every rank, shape (n_nodes or n_cells, values of each).
+            place: Where the values are defined.
+
+        Returns:
+            Shape (n_local_nodes or n_local_cells, values of each).
         """
         return whole[self._rows_of(place)]
 

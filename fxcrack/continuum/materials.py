@@ -49,7 +49,7 @@ class Isotropic:
         _check_common(name, self.expansion, self.density)
 
     def stiffness(self) -> Array:
-        """Stiffness, shape (6, 6)."""
+        """Stiffness, shape (6, 6), force/length^2."""
         shear = self.E / (2.0 * (1.0 + self.nu))
         lame = self.E * self.nu / ((1.0 + self.nu) * (1.0 - 2.0 * self.nu))
         c = np.zeros((6, 6))
@@ -131,7 +131,7 @@ class Orthotropic:
         return s
 
     def stiffness(self) -> Array:
-        """Stiffness in global axes, shape (6, 6)."""
+        """Stiffness in global axes, shape (6, 6), force/length^2."""
         to_local = self._to_local()
         return np.asarray(to_local.T @ np.linalg.inv(self._compliance()) @ to_local)
 
@@ -254,7 +254,12 @@ class Plastic(Isotropic):
             )
 
     def curve(self) -> tuple[Array, Array, Array]:
-        """Knots of the plastic strain, yield stress there and slope after each."""
+        """Hardening curve, piecewise linear.
+
+        Returns:
+            Equivalent plastic strain at the knots, yield stress there and slope after each
+            (both force/length^2), each of shape (n_knots,).
+        """
         if isinstance(self.hardening, int | float):
             assert self.yield_stress is not None
             first, slope = float(self.yield_stress), float(self.hardening)

@@ -170,11 +170,11 @@ class Plasticity(Term):
         return float(comm.allreduce(fem.assemble_scalar(self._integrated), op=MPI.SUM))
 
     def spent(self) -> dict[str, float]:
-        """Plastic work up to the last commit."""
+        """Plastic work up to the last commit, force x length."""
         return {"plastic_energy": self._plastic_work}
 
     def work(self) -> float:
-        """Work of the temperature up to the last commit."""
+        """Work of the temperature up to the last commit, force x length."""
         return self._thermal_work
 
     def equivalent_strain(self) -> fem.Function:
@@ -187,7 +187,12 @@ class Plasticity(Term):
         return out
 
     def state(self) -> dict[str, Array]:
-        """Plastic strain, stress and sums of the last commit."""
+        """Plastic strain, stress and sums of the last commit.
+
+        Returns:
+            "sums": plastic work and work of the temperature, force x length, shape (2,); and of
+            each part i "i.stress" and the others of :meth:`PlasticPart.committed`.
+        """
         out = {"sums": np.array([self._plastic_work, self._thermal_work])}
         for i, p in enumerate(self._points):
             out |= {f"{i}.{key}": value.copy() for key, value in p.committed().items()}
@@ -198,7 +203,7 @@ class Plasticity(Term):
         return {f"{i}.{key}": p.cells for i, p in enumerate(self._points) for key in p.committed()}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`."""
+        """Set the committed state from :meth:`state`, arrays of the same shapes."""
         self._plastic_work, self._thermal_work = (float(x) for x in state["sums"])
         for i, p in enumerate(self._points):
             p.set({key: state[f"{i}.{key}"].copy() for key in p.committed()})
@@ -224,11 +229,12 @@ class PlasticPart:
         n_per_cell: Quadrature points of a cell.
 
     Attributes:
-        cells: Owned cells of the part.
-        stress: Stress of the last commit, shape (n_points, n).
+        cells: Owned cells of the part, shape (n_cells,).
+        stress: Stress of the last commit, shape (n_points, n), force/length^2.
         plastic: Plastic strain of the last commit, shape (n_points, n).
         equivalent: Equivalent plastic strain p of the last commit, shape (n_points,).
-        trial_stress: Stress of the last update.
+        thermal: Thermal strain of the last commit, shape (n_points, n); (0, n) without temperature.
+        trial_stress: Stress of the last update, shape (n_points, n), force/length^2.
     """
 
     def __init__(self, continuum: Continuum, part: int, n_per_cell: int) -> None:
@@ -253,9 +259,14 @@ class PlasticPart:
     def update(self, strain: Array, thermal: Array | None) -> tuple[Array, Array, Array]:
         """Trial state at a strain free of thermal strain.
 
+        Args:
+            strain: Strain less thermal strain, engineering shears, shape (n_points, n).
+            thermal: Thermal strain, shape (n_points, n); ``None`` without temperature.
+
         Returns:
-            Flow direction s/|s|, factor theta of the shear modulus, factor theta-bar of the flow
-            direction (Simo and Hughes, eqs. 3.3.14-15).
+            Flow direction s/|s|, shape (n_points, n); factor theta of the shear modulus and factor
+            theta-bar of the flow direction, each of shape (n_points,) (Simo and Hughes, eqs.
+            3.3.14-15).
         """
         three_mu = 3.0 * self.mu
         elastic = strain / self._twice - self.plastic
@@ -289,12 +300,18 @@ class PlasticPart:
         return np.asarray(self._yield[k] + self._slopes[k] * (p - self._knots[k]))
 
     def plastic_work(self) -> Array:
-        """Mean stress times plastic strain of the increment: exact as the elastic energy is."""
+        """Mean stress times plastic strain of the increment, shape (n_points,), force/length^2.
+
+        Exact, as the elastic energy is.
+        """
         mean = 0.5 * (self.stress + self.trial_stress)
         return np.asarray((mean * (self._trial_plastic - self.plastic)) @ self._twice)
 
     def thermal_work(self) -> Array:
-        """Minus mean stress times thermal strain of the increment."""
+        """Minus mean stress times thermal strain of the increment.
+
+        Shape (n_points,), force/length^2.
+        """
         mean = 0.5 * (self.stress + self.trial_stress)
         return np.asarray(-(mean * (self._trial_thermal - self.thermal)) @ self._twice)
 
@@ -304,7 +321,7 @@ class PlasticPart:
         self.equivalent, self.thermal = self._trial_equivalent, self._trial_thermal
 
     def committed(self) -> dict[str, Array]:
-        """The committed arrays by name."""
+        """The committed arrays by name; shapes as in the attributes of the class."""
         return {
             "stress": self.stress,
             "plastic": self.plastic,
@@ -313,6 +330,6 @@ class PlasticPart:
         }
 
     def set(self, state: dict[str, Array]) -> None:
-        """Set the committed arrays."""
+        """Set the committed arrays, of the shapes of :meth:`committed`; they are not copied."""
         self.stress, self.plastic = state["stress"], state["plastic"]
         self.equivalent, self.thermal = state["equivalent"], state["thermal"]

@@ -1,4 +1,4 @@
-"""What the user says about temperature: a field in the bodies, materials tabulated against it.
+"""User input for the temperature: a field in the bodies, materials tabulated against it.
 
     T(x, t) = T_ref + a(t) (T(x) - T_ref),    or fields at some times, linear in between
 
@@ -133,7 +133,7 @@ class ByTemperature:
         return getattr(self.materials[0], "density", None)
 
     def stiffness(self) -> Array:
-        """No stiffness without a temperature.
+        """Refuse: the stiffness, shape (6, 6), needs a temperature.
 
         Raises:
             InputError: Always: the scene has no temperature.
@@ -145,6 +145,6 @@ class ByTemperature:
 
 
 def expansion_of(material: Material) -> Array:
-    """Thermal strain per degree of a material, zero where it has none, shape (6,)."""
+    """Thermal strain per degree of a material, 0 where it has none, shape (6,), 1/temperature."""
     expand = getattr(material, "thermal_expansion", None)
     return np.zeros(6) if expand is None else np.asarray(expand(), dtype=np.float64)

@@ -29,10 +29,10 @@ class Term:
             temperature): the same number, the same tangent.
         finite: Whether bodies may turn and stretch by any amount.
         dynamic: Whether its forces depend on how long an increment takes.
-        path_dependent: Whether its stress depends on how the bodies came here.
-        closed: Whether it stores all the work it takes, that of loads and its own
+        path_dependent: Whether its stress depends on the loading history.
+        closed: Whether it stores all the work done on it, that of loads and its own
             (:meth:`path_work`).
-        energy_name: What the balance calls its stored energy; terms of one name are summed.
+        energy_name: Name of its stored energy in the energy balance; terms of one name are summed.
     """
 
     name: str = ""
@@ -65,41 +65,49 @@ class Term:
         """An increment of dt ends at a time: set what depends on them; collective."""
 
     def update(self, u: fem.Function) -> None:
-        """A new trial u was set: update what lives at quadrature points; collective."""
+        """A new trial u was set: update what is stored at quadrature points; collective."""
 
     def commit(self, u: fem.Function) -> None:
         """The increment is accepted: its end becomes the state the next one starts from."""
 
     def spent(self) -> dict[str, float]:
-        """Energies turned into something else up to the last commit, by name; collective."""
+        """Energies dissipated up to the last commit by name, force x length; collective."""
         return {}
 
     def path_work(self, u: fem.Function) -> float:
-        """Work it does on the bodies on the straight path from the last commit to u; collective."""
+        """Work it does on the bodies on the straight path from the last commit to u; collective.
+
+        In force x length.
+        """
         return 0.0
 
     def work(self) -> float:
         """Work done on the bodies through the term up to the last commit; collective.
 
-        That of loads that follow the bodies, and of a temperature; supports and dead loads do
-        theirs elsewhere.
+        In force x length: that of loads that follow the bodies, and of a temperature; the work of
+        supports and dead loads is not part of any term.
         """
         return 0.0
 
     def state(self) -> dict[str, Array]:
-        """Committed state of this rank; empty where there is none."""
+        """Committed state of this rank; empty where there is none.
+
+        Returns:
+            Arrays by name: of shape (n_dofs,), ghosts too, where :meth:`places` gives a space; cell
+            by cell along the first axis where it gives cells; of any shape otherwise.
+        """
         return {}
 
     def places(self) -> dict[str, Place]:
-        """Where the arrays of :meth:`state` live; those not named are the same on all ranks."""
+        """Where the arrays of :meth:`state` are defined; those not named: the same on all ranks."""
         return {}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`."""
+        """Set the committed state from :meth:`state`, arrays of the same shapes."""
 
 
 class StoringTerm(Term):
-    """A term of some parts that stores all the energy it takes, and knows their temperature.
+    """A term of some parts that stores all the work done on it and depends on their temperature.
 
     Args:
         continuum: Materials, model, measures and temperature.
@@ -133,15 +141,15 @@ class StoringTerm(Term):
         return 0.0 if self._thermal is None else float(self._thermal.work)
 
     def state(self) -> dict[str, Array]:
-        """State of the work of the temperature."""
+        """State of the work of the temperature, shapes as in :meth:`ThermalWork.state`."""
         return {} if self._thermal is None else dict(self._thermal.state())
 
     def places(self) -> dict[str, Place]:
-        """Where that state lives."""
+        """Where that state is defined."""
         return {} if self._thermal is None else dict(self._thermal.places())
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`."""
+        """Set the committed state from :meth:`state`, arrays of the same shapes."""
         if self._thermal is not None:
             self._thermal.restore(state)
 

@@ -3,7 +3,8 @@
     W = 1/2 int (e - e_th) : C : (e - e_th) w dV,    e_th = expansion (T - T_ref)
 
 In plane strain and in a ring e is the whole strain, out of the plane too, where thermal strain is
-held back and stores energy; in plane stress it is that of the plane: the sheet is free to thicken.
+constrained and stores energy; in plane stress it is that of the plane: the thickness is free to
+change.
 """
 
 from __future__ import annotations
@@ -86,7 +87,7 @@ def held_energies(continuum: Continuum) -> Array:
     1/2 u K u - sum_k a_k f_k u + 1/2 sum_kl a_k a_l E_kl.
 
     Returns:
-        Shape (n_patterns, n_patterns), force x length.
+        The symmetric matrix E, shape (n_patterns, n_patterns), force x length.
     """
     field = _field_of(continuum)
     n = len(field.patterns)

@@ -32,7 +32,7 @@ class ThermalWork:
             temperature.
 
     Attributes:
-        work: Work up to the last commit, the same on all ranks.
+        work: Work up to the last commit, force x length, the same on all ranks.
     """
 
     def __init__(self, continuum: Continuum, energy: Callable[[fem.Function], Any]) -> None:
@@ -81,7 +81,13 @@ class ThermalWork:
         self._last_rise = self._field.rise.x.array.copy()
 
     def state(self) -> dict[str, Array]:
-        """Displacement and temperature of the last commit, work so far."""
+        """Displacement and temperature of the last commit, work so far.
+
+        Returns:
+            "last": displacement of the local dofs, ghosts too, shape (n_dofs,), length; "rise":
+            T - T_ref, local values, ghosts too, shape (n_values,), temperature; "work": shape
+            (1,), force x length.
+        """
         return {
             "last": self._last.copy(),
             "rise": self._last_rise.copy(),
@@ -93,7 +99,7 @@ class ThermalWork:
         return {"last": self._continuum.space, "rise": self._field.rise.function_space}
 
     def restore(self, state: dict[str, Array]) -> None:
-        """Set the committed state from :meth:`state`."""
+        """Set the committed state from :meth:`state`, arrays of the same shapes."""
         self._last[:] = state["last"]
         self._last_rise = state["rise"].copy()
         self.work = float(state["work"][0])

@@ -2,7 +2,7 @@
 
     r(u) = sum of the terms' residuals,    K(u) = sum of their tangents
 
-Dead loads are not in here: they are border columns of the condensed system.
+Dead loads are not included: they are border columns of the condensed system.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ class WeakForm:
         self._order = FileOrder(continuum.mesh.domain)
         self.u = fem.Function(continuum.space, name="displacement")
         self.seconds: dict[str, float] = {}
-        # one residual and one tangent per term, so that the cost of each can be told
+        # one residual and one tangent per term, so that the cost of each can be measured
         self._forms: list[tuple[Term, Any, Any]] = []
         self._energies: dict[str, Any] = {}
         self._matrix: PETSc.Mat | None = None
@@ -77,12 +77,12 @@ class WeakForm:
 
     @property
     def closed(self) -> bool:
-        """Whether all work on the bodies is stored, but for what interfaces take."""
+        """Whether all work on the bodies is stored, except for that done on interfaces."""
         return all(t.closed for t in self.terms)
 
     @property
     def path_dependent(self) -> bool:
-        """Whether stresses depend on how the bodies came here."""
+        """Whether stresses depend on the loading history."""
         return any(t.path_dependent for t in self.terms)
 
     @property
@@ -161,7 +161,7 @@ class WeakForm:
     def tangents(self) -> tuple[PETSc.Mat, PETSc.Mat]:
         """The symmetric part of K(u), and K(u); owned by this object.
 
-        The interface algebra stands on a symmetric S; the iteration converges with this part too.
+        The interface algebra requires a symmetric S; the iteration converges with this part too.
         """
         matrix = self.tangent()
         if self.symmetric:
@@ -176,7 +176,7 @@ class WeakForm:
         return self._symmetric, matrix
 
     def stored(self) -> dict[str, float]:
-        """Energies stored at the present displacement, by name; collective."""
+        """Energies stored at the present displacement by name, force x length; collective."""
         self.compile()
         comm = self.continuum.comm
         return {
@@ -187,13 +187,13 @@ class WeakForm:
     def stress(self) -> fem.Function:
         """Cauchy stress at the present displacement, means over the undeformed cells; collective.
 
-        Components in the order of ``model.stress_labels``.
+        Components in the order of ``model.stress_labels``, force/length^2.
         """
         parts = [part for term in self.terms for part in term.stresses(self.u)]
         return cell_means(self.continuum, parts)
 
     def spent(self) -> dict[str, float]:
-        """Energies turned into something else so far, by name; collective."""
+        """Energies dissipated up to the last commit by name, force x length; collective."""
         out: dict[str, float] = {}
         for term in self.terms:
             for name, value in term.spent().items():
@@ -222,10 +222,12 @@ class WeakForm:
             self._add(term.name, start)
 
     def state(self) -> dict[str, Array]:
-        """Committed state: positions, displacement and what the terms remember; collective.
+        """Committed state: positions, displacement and the state of the terms; collective.
 
         Returns:
-            On rank 0, fields in the order of :class:`FileOrder`.
+            On rank 0 fields in the order of :class:`FileOrder`, shape (n_nodes or n_cells, values
+            of each), lengths in "positions" and "displacement"; empty on the others. Arrays of
+            terms without a place are as in :meth:`Term.state`, on every rank.
         """
         places = self._places()
         return {
@@ -237,7 +239,7 @@ class WeakForm:
         """Set the committed state from :meth:`state` of the same mesh and terms; collective.
 
         Args:
-            state: The same on all ranks, of any number of ranks.
+            state: From rank 0, shapes as there, the same on all ranks; of any number of ranks.
 
         Raises:
             InputError: Cells or their nodes have another order than they had.
@@ -271,7 +273,7 @@ class WeakForm:
         return out
 
     def _places(self) -> dict[str, Place]:
-        """Where they live, but for those that are the same on all ranks."""
+        """Where they are defined, except for those that are the same on all ranks."""
         out: dict[str, Place] = dict.fromkeys(("positions", "displacement"), self.continuum.space)
         for i, term in enumerate(self.terms):
             out |= {f"{i}.{key}": place for key, place in term.places().items()}

@@ -1,4 +1,4 @@
-"""How far a crack has run: open length along a line, or open area over the front width.
+"""Extent of a crack: open length along a line, or open area over the front width.
 
 2-D: the length of the open run that ends at a tip, measured along the slave surface from the end
 of the surface; half of it when both its ends are tips.

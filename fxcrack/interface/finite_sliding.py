@@ -38,8 +38,8 @@ def renewed(
         pair: The pair as it is.
         bonded: Slave nodes that are bonded now, shape (n_nodes,).
         master: Undeformed master surface.
-        u_slave: Displacements of the slave nodes, shape (n_nodes, gdim).
-        u_master: Displacements of the master nodes, shape (master.n_nodes, gdim).
+        u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
+        u_master: Displacements of the master nodes, shape (master.n_nodes, gdim), length.
 
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
@@ -86,14 +86,29 @@ def renewed(
 
 
 def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
-    """:data:`CHANGING` of a pair, masters as nodes of their surface: the same on any ranks."""
+    """:data:`CHANGING` of a pair, independent of the number of ranks.
+
+    Args:
+        pair: The pair.
+        master: Its master surface.
+
+    Returns:
+        Arrays by name, shapes as in :class:`Pair`; "masters", shape (n_nodes, k), as node numbers
+        of the master surface.
+    """
     order = np.argsort(master.dofs)
     nodes = order[np.searchsorted(master.dofs[order], pair.masters)]
     return {name: getattr(pair, name) for name in CHANGING} | {"masters": nodes}
 
 
 def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray[Any]]) -> Pair:
-    """A pair with what :func:`changing` has said, on any number of ranks."""
+    """A pair with the arrays of :func:`changing`.
+
+    Args:
+        pair: The pair.
+        master: Its master surface.
+        known: From :func:`changing`, same shapes, on any number of ranks.
+    """
     nodes = known["masters"]
     changed = {**known, "masters": master.dofs[nodes], "master_maps": master.maps_at(nodes)}
     return replace(pair, **changed)

@@ -148,18 +148,18 @@ class Front:
         how the face that is the slave has stretched.
 
         Args:
-            x: Shape (n_nodes, 3), length.
+            x: Present positions, shape (n_nodes, 3), length.
         """
         self.surface = self.surface.moved(x)
         self.placed += 1
         self._cache.clear()
 
     def release(self, nodes: Ints) -> None:
-        """Open nodes and forget the geometry around them."""
+        """Release slave nodes, shape (n,), and discard the cached geometry around them."""
         self._set(nodes, bonded=False)
 
     def bond(self, nodes: Ints) -> None:
-        """Bond nodes again whose release is undone."""
+        """Bond slave nodes, shape (n,), again whose release is undone."""
         self._set(nodes, bonded=True)
 
     def _set(self, nodes: Ints, *, bonded: bool) -> None:
@@ -173,11 +173,11 @@ class Front:
                             self._cache.pop(int(third), None)
 
     def neighbours(self, node: int) -> Ints:
-        """Nodes linked to a node along an edge."""
+        """Nodes linked to a node along an edge, shape (n_edges,)."""
         return np.asarray(self.links[node][:, 0])
 
     def candidates(self) -> Ints:
-        """Front nodes, ascending.
+        """Front nodes, ascending, shape (n_tips,).
 
         Raises:
             InterfaceError: The faces are second-order triangles.
@@ -338,7 +338,7 @@ class Front:
         ahead = int(np.argmax(cosine))
         corner, middle = links[behind]
         if cosine[ahead] < 0.3 or ahead == behind or not self.bonded[links[ahead, 1]]:
-            # the surface ends, or the tip on the other side has let the midside node go
+            # the surface ends, or the tip on the other side has released the midside node
             force_nodes, d_ahead = np.array([node, node]), 0.0
         else:
             force_nodes, d_ahead = np.array([node, links[ahead, 1]]), float(length[ahead])

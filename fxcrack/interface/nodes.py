@@ -26,7 +26,7 @@ class InterfaceNodes:
 
     Args:
         layout: Unknowns of nodes and their numbers.
-        nodes: Global nodes, any order, repeated or not; the same on every rank.
+        nodes: Global nodes, shape (n,), any order, repeated or not; the same on every rank.
 
     Attributes:
         layout: The layout.

@@ -28,7 +28,7 @@ Bonded = str | Callable[[Array], Array] | Array | None
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """Two facing surfaces, partly bonded; the crack runs between them.
+    """Two facing surfaces, partly bonded; the crack propagates between them.
 
     Args:
         slave: Facet group of the slave side.
@@ -148,7 +148,8 @@ class Pair:
             forces: On the slave nodes' displacements, shape (n_nodes, gdim), force.
 
         Returns:
-            W P_m^t f of each master, shape (n_nodes, k, n_unknowns).
+            W P_m^t f of each master, shape (n_nodes, k, n_unknowns); force in the components of the
+            displacement.
         """
         each = self.weights[:, :, None] * forces[:, None, :]
         if self.master_maps is None:
@@ -158,6 +159,10 @@ class Pair:
 
 def check_coefficients(mu: Array, where: str) -> None:
     """Refuse coefficients of friction that are negative or no numbers.
+
+    Args:
+        mu: Coefficients, shape (n,).
+        where: Beginning of the message.
 
     Raises:
         InterfaceError: One of them is.

@@ -18,12 +18,12 @@ from fxcrack.interface.surface import FacetSurface, facet_element, shape_functio
 
 @dataclass(frozen=True)
 class Projection:
-    """Where points fall on a surface.
+    """Projections of points onto a surface.
 
     Attributes:
         facet: Facet number per point, shape (n,).
         weights: Shape-function weights on the facet's nodes, rows sum to 1, shape (n, k).
-        foot: Projected points, shape (n, 3).
+        foot: Projected points, shape (n, 3), length.
         normal: Outward unit normal of the surface there, shape (n, 3).
         distance: Distance from point to foot, shape (n,), length.
     """
@@ -39,11 +39,11 @@ def project(points: Array, surface: FacetSurface) -> Projection:
     """Project points onto a surface.
 
     Args:
-        points: Shape (n, 3).
+        points: Positions, shape (n, 3), length.
         surface: Facets to project on.
 
     Returns:
-        The closest feet; points beyond the border fall on the border.
+        The closest points, one per row; points beyond the border are projected on the border.
     """
     n, k = len(points), surface.facets.shape[1]
     best = np.full(n, np.inf)

@@ -155,13 +155,14 @@ def align_frames(
 
     Args:
         pairs: Interfaces.
-        which: Per pair, support column of each (slave node, component), -1 if free.
+        which: Per pair, support column of each component, -1 if free, shape (n_nodes, gdim).
         jumped: Per pair, the slave nodes that have a jump, shape (n_nodes,).
         supports: For the titles in messages.
         gdim: Dimension.
 
     Returns:
-        Frames and held components per pair.
+        Per pair the frames, shape (n_nodes, gdim, gdim), and whether a component of the jump is
+        held, shape (n_nodes, gdim).
 
     Raises:
         InterfaceError: A held direction is oblique to the interface.
@@ -214,7 +215,7 @@ def check_slaves(
     value: Array,
     supports: Supports,
 ) -> None:
-    """Refuse slave nodes for which no jump can be defined; the same verdict on every rank.
+    """Refuse slave nodes for which no jump can be defined; the same result on every rank.
 
     A node is a slave once only, and where a support holds a displacement component of a bonded
     slave node, it holds that of the masters in the same way

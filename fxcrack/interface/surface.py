@@ -60,8 +60,8 @@ class FacetSurface:
         dofs: Global displacement node (block index) of each node, shape (n_nodes,).
         x: Node positions, shape (n_nodes, 3), length.
         facets: Node numbers per facet in basix order, shape (n_facets, nodes_per_facet).
-        inner: A point inside the cell behind each facet, shape (n_facets, 3).
-        breadth: Out-of-plane extent at the nodes (1 in 3-D), shape (n_nodes,).
+        inner: A point inside the cell behind each facet, shape (n_facets, 3), length.
+        breadth: Out-of-plane extent at the nodes, length (1 in 3-D), shape (n_nodes,).
         outward: Sign that turns each facet's own area vector outward, shape (n_facets,); found
             from ``inner`` where it is not given.
         point_maps: Displacement of each node's point per unknown of the node, shape
@@ -122,7 +122,7 @@ class FacetSurface:
         """The same facets with their nodes at other positions, sides kept.
 
         Args:
-            x: Shape (n_nodes, 3), length.
+            x: New positions, shape (n_nodes, 3), length.
         """
         if self.outward is not None:
             return replace(self, x=x)
@@ -146,7 +146,10 @@ class FacetSurface:
 
     @cached_property
     def areas(self) -> Array:
-        """Tributary area of each node, the integral of its shape function, shape (n_nodes,)."""
+        """Tributary area of each node, the integral of its shape function.
+
+        Shape (n_nodes,), length^2.
+        """
         xi, weights = basix.make_quadrature(getattr(basix.CellType, self.kind), 2 * self.order + 2)
         values, _ = shape_functions(self.kind, self.order, np.asarray(xi))
         _, size = self.facet_normals(np.asarray(xi))
@@ -285,7 +288,7 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
 
 
 def _check_facets(surface: FacetSurface) -> None:
-    """Refuse facets without length or area: no crack can tell how far it has run over them.
+    """Refuse facets without length or area: crack lengths and areas need them.
 
     Raises:
         InterfaceError: Says where the first one is.

@@ -1,4 +1,4 @@
-"""Tips of a front, and the little geometry they are made of."""
+"""Tips of a front and their local geometry."""
 
 from __future__ import annotations
 
@@ -58,7 +58,17 @@ class Tips:
 
 
 def gradient(s: FacetSurface, facet: int, indicator: Array) -> tuple[Array, float]:
-    """Gradient of a nodal indicator at a facet's centre, and the facet's size."""
+    """Gradient of a nodal indicator at a facet's centre, and the facet's size.
+
+    Args:
+        s: Surface.
+        facet: Number of the facet.
+        indicator: Nodal values, shape (n_nodes,).
+
+    Returns:
+        Gradient, shape (3,), 1/length; length of an interval, area of a quadrilateral or twice the
+        area of a triangle (length^2).
+    """
     corner = s.facets[facet, : s.n_corners]
     x, v = s.x[corner], indicator[corner]
     if s.kind == "interval":
@@ -77,12 +87,12 @@ def gradient(s: FacetSurface, facet: int, indicator: Array) -> tuple[Array, floa
 
 
 def norm(a: Array) -> float:
-    """Length of one vector; numpy's own takes ten times as long on three numbers."""
+    """Norm of one vector, shape (3,); numpy's own takes ten times as long on three numbers."""
     return math.sqrt(float(a @ a))
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Product of two vectors; likewise."""
+    """Vector product of two vectors, each of shape (3,), as is the result; likewise."""
     (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
     return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 
@@ -109,7 +119,7 @@ class FrontUnits:
         return np.asarray(self.shares @ values)
 
     def at_tips(self, values: Array) -> Array:
-        """The largest value of the units a tip is part of, (..., n_units) to (..., n_tips)."""
+        """Largest value of the units a tip is part of, shape (..., n_units) to (..., n_tips)."""
         spread = np.where(self.shares > 0.0, values[..., None], -np.inf)
         return np.asarray(spread.max(axis=-2, initial=-np.inf))
 

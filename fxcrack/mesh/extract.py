@@ -32,7 +32,7 @@ _PLANE = 1e-9
 
 
 def extract(model: Any, gdim: int | None) -> RawMesh:
-    """Read the current gmsh model; to be called where it lives.
+    """Read the current gmsh model; to be called on the rank that holds it.
 
     Args:
         model: ``gmsh.model``, meshed.

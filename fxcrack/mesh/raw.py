@@ -181,7 +181,7 @@ def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
             result = work()
         except FxcrackError as error:
             problem, cause = str(error), error
-        except Exception as error:  # whatever it is, the other ranks must hear of it
+        except Exception as error:  # any exception must reach the other ranks
             problem, cause = f"{type(error).__name__} while making a mesh: {error}", error
     try:
         raise_on_all_ranks(comm, problem, MeshError)

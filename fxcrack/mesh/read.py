@@ -124,7 +124,7 @@ def gmsh_model(name: str) -> Iterator[Any]:
 
 
 def prepare(model: Any, name: str, gdim: int | None = None, split: Sequence[Split] = ()) -> RawMesh:
-    """Read the current gmsh model, check it and split its surfaces; to be called where it lives.
+    """Read the current gmsh model, check it and split its surfaces; on the rank that holds it.
 
     Args:
         model: ``gmsh.model``, meshed.

@@ -3,7 +3,7 @@
 A node of the surface is given to each pair (cell, node) that holds it; pairs of one node are joined
 where their cells share a facet that holds the node and is not on the surface. Pieces of a node that
 lie on different sides of the surface become different nodes. On the inner border of the surface
-there is one piece only: such nodes, where the two sides stay grown together, are not doubled.
+there is one piece only: such nodes, where the two sides remain connected, are not doubled.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ _AMBIGUOUS = 1e-6
 class Split:
     """Split the mesh along a named internal surface into a slave and a master side.
 
-    The slave side gets new nodes. The name of the surface goes; groups of facets, edges and nodes
-    that lie on it get both copies, those that only touch it stay with the cells they belong to.
+    The slave side gets new nodes. The name of the surface is removed; groups of facets, edges and
+    nodes that lie on it get both copies, those that only touch it stay with the cells they belong
+    to.
     Where the surface ends inside the mesh, the nodes of that border are nodes of both sides; a
     facet with no corner node off that border cannot open and is in neither.
 
@@ -286,7 +287,7 @@ def _slave_sides(raw: RawMesh, split: Split, corners: _Corners) -> Ints:
 
 
 def _votes(raw: RawMesh, split: Split, corners: _Corners) -> tuple[Floats, Floats]:
-    """How much each facet speaks for its side 0 as the slave, and the most it could.
+    """Weight of each facet for its side 0 as the slave, and the largest possible weight.
 
     Shapes (n_facets,) each: area times the cosine between the normal into side 0 and ``toward``.
     """
