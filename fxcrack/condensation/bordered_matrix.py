@@ -28,7 +28,11 @@ def load_and_monitor_vectors(
         continuum: Displacement space.
         loads: Force patterns.
         monitors: Monitored displacements.
-        followed: Sets of this rank's nodes whose mean displacement is wanted, all components.
+        followed: Sets of this rank's nodes whose mean displacement is wanted, all components, each
+            of shape (n,).
+
+    Returns:
+        One vector per load (force), per monitor and per component of each set (dimensionless).
     """
     out = []
     for load in loads:

@@ -35,7 +35,7 @@ BLOCK = 32
 _FLOOR = 1e-6
 """Least energy of a column over that of its own coordinate: rigid motions have none."""
 _FIELD = 0.1
-"""Tolerance of displacements over that of columns: they feel the error itself, not its square."""
+"""Tolerance of displacements over that of columns: their error is that of X, not its square."""
 
 
 @dataclass(frozen=True)
@@ -65,8 +65,10 @@ class SchurColumns:
         rtol: Energy norm of a column's error over that of the column.
 
     Attributes:
-        known: Numbers of the last coordinates whose columns are there, in their order in S.
-        schur: S on them, the same on every rank.
+        known: Numbers of the last coordinates whose columns are there, in their order in S, shape
+            (n_known,).
+        schur: S on them, the same on every rank, shape (n_known, n_known), force/length between
+            jumps.
         iterations: Block iterations per block so far.
     """
 
@@ -104,7 +106,7 @@ class SchurColumns:
         """Compute the columns that are not there yet; collective.
 
         Args:
-            numbers: Last coordinates.
+            numbers: Last coordinates, shape (k,).
 
         Returns:
             How many were computed.
@@ -151,7 +153,8 @@ class SchurColumns:
         """Displacements for given values of the known coordinates; collective.
 
         Args:
-            values: Shape (n_known,).
+            values: Jumps (length), amplitudes of supports and load factors, in the order of
+                ``known``, shape (n_known,).
 
         Returns:
             u on the displacement dofs; the caller destroys it.

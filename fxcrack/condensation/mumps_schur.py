@@ -198,7 +198,7 @@ def ordering(gdim: int) -> int:
 
 
 def mirror_lower(square: Array) -> None:
-    """Copy the lower triangle onto the upper one, in place, block by block."""
+    """Copy the lower triangle onto the upper one, shape (n, n), in place, block by block."""
     n, step = len(square), 256
     for i in range(0, n, step):
         block = square[i : i + step, i : i + step]
@@ -211,7 +211,7 @@ def factor_problem(
 ) -> str | None:
     """Why a factor of a stiffness matrix must not be used, ``None`` if it may.
 
-    MUMPS finds no fault in a body held by nothing: round-off leaves it a last pivot of either
+    MUMPS reports no error for a body held by nothing: round-off leaves it a last pivot of either
     sign, below 1e-10 of the largest in the cases tried. Sound models had more than 1e-9, up to
     slenderness 8000.
 

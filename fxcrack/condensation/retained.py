@@ -1,7 +1,7 @@
 """Which jump components take part in the condensation, and when to factor again.
 
 Ahead of the front these are the bonded nodes the crack may reach before the next rebase;
-behind it, the wake the criterion looks at; with contact, all open normals, and with friction all
+behind it, the wake the criterion evaluates; with contact, all open normals, and with friction all
 open components of interfaces with contact. How far it reaches is the number of nodes k that costs
 least. With a factorisation per set:
 ceil(L/k) (t_plain + c n(k)^2), L nodes to go, n retained jumps, c the cost of an entry of S.
@@ -107,7 +107,15 @@ class ColumnCost:
         self.per_set = max(seconds - column_seconds, 1e-4)
 
     def reach(self, counts: npt.NDArray[np.int64]) -> int:
-        """Best number of candidate nodes to take; see :meth:`CostModel.reach`."""
+        """Best number of candidate nodes to take.
+
+        Args:
+            counts: Cumulative number of retained jumps after each candidate node,
+                nearest first, shape (n_candidates,).
+
+        Returns:
+            How many candidates, at least 1 if there is one.
+        """
         if not len(counts):
             return 0
         k = np.arange(1, len(counts) + 1)
@@ -133,12 +141,16 @@ def choose_roles(
         pairs: Interfaces.
         fronts: Their present fronts.
         active: Whether the crack may grow in each.
-        reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown).
+        reach: Distance the crack may grow before the analysis stops, per pair (inf: unknown),
+            length.
         cost: Cost model.
-        around: Distances ahead of and behind the tips that the criterion looks at, per pair.
+        around: Distances ahead of and behind the tips that the criterion needs, per pair, length.
         keep: (pair, slave node) of bonds that carry a force and must stay retained.
         cap_mb: Memory S may take, MB.
         gdim: Dimension.
+
+    Returns:
+        FIXED, FREE or RETAINED per pair and jump component, shape (n_nodes, gdim).
 
     Raises:
         InputError: Even the smallest useful set exceeds the cap.

@@ -5,7 +5,7 @@ With the free jumps condensed out, the softening ones obey a small system
     (S* - B) delta = c - g*,    S* = S_RR - Y^t Y,   Y = L^-1 S_FR,
 
 B the (negative) stiffness of the bonds. Where S* - B is not positive definite the state is
-unstable, or neutral; the bonds then run open, down to the next minimum of the energy along their
+unstable, or neutral; the bonds then open unstably, to the next minimum of the energy along their
 branches.
 """
 
@@ -45,7 +45,7 @@ class CohesiveBonds:
     """All softening bonds of a jump system.
 
     Args:
-        schur: S.
+        schur: S, shape (n_last, n_last), force/length between jumps.
 
     Attributes:
         bonds: The bonds.
@@ -62,7 +62,11 @@ class CohesiveBonds:
         self._star: Array | None = None
 
     def taken(self, jump: Array) -> float:
-        """Energy all softening bonds have taken so far, finished ones included."""
+        """Energy all softening bonds have taken so far, finished ones included.
+
+        Args:
+            jump: Retained jumps, shape (n_retained,), length.
+        """
         return self.finished + sum(b.taken(b.opening(jump)) for b in self.bonds)
 
     @property
@@ -79,7 +83,13 @@ class CohesiveBonds:
         self._star = None
 
     def renew(self, schur: Array, bonds: list[CohesiveBond], cholesky: GrowingCholesky) -> None:
-        """Take another S with the same numbering, and the bonds."""
+        """Take another S with the same numbering, and the bonds.
+
+        Args:
+            schur: S, shape (n_last, n_last), force/length between jumps.
+            bonds: The bonds.
+            cholesky: Factor of the new S over the free components.
+        """
         self._schur, self.bonds = schur, bonds
         self.refresh(cholesky)
 
@@ -97,7 +107,7 @@ class CohesiveBonds:
 
     @property
     def star(self) -> Array:
-        """S*, shape (r, r)."""
+        """S*, shape (r, r), force/length."""
         if self._star is None:
             mine = self.components
             star = self._schur[np.ix_(mine, mine)] - self._forward.T @ self._forward
@@ -110,7 +120,7 @@ class CohesiveBonds:
         return self._forward
 
     def _laws(self, faster: float = 0.0) -> tuple[Array, Array]:
-        """Forces at zero opening c, shape (r,), and bond stiffness B, shape (r, r).
+        """Forces at zero opening c, shape (r,), force, and stiffness B, shape (r, r), force/length.
 
         Args:
             faster: Fraction by which bonds soften faster than they do.
@@ -131,13 +141,13 @@ class CohesiveBonds:
         return constant, stiffness
 
     def solve(self, right: Array) -> Array:
-        """Jumps for given -g*, branches as they are, shape (r,)."""
+        """Jumps (length) for given -g* (force), branches as they are, both of shape (r,)."""
         self.counts.solves += 1
         constant, stiffness = self._laws()
         return np.asarray(np.linalg.solve(self.star - stiffness, constant + right))
 
     def rates(self, right: Array) -> Array:
-        """Rates of the jumps for given rates of -g*, branches as they are, shape (r,)."""
+        """Rates of the jumps for given rates of -g*, branches as they are, both of shape (r,)."""
         _, stiffness = self._laws()
         return np.asarray(np.linalg.solve(self.star - stiffness, right))
 
@@ -156,8 +166,8 @@ class CohesiveBonds:
         """First fraction of a piece at which a bond leaves its branch, and which ones do.
 
         Args:
-            before: Jumps at the beginning, shape (n_retained,).
-            after: Jumps at the end.
+            before: Jumps at the beginning, shape (n_retained,), length.
+            after: Jumps at the end, shape (n_retained,), length.
 
         Returns:
             inf and nothing if none does.
@@ -186,8 +196,12 @@ class CohesiveBonds:
     def switch(self, bond: CohesiveBond, jump: Array) -> bool:
         """Move a bond to its next branch at a state.
 
+        Args:
+            bond: The bond.
+            jump: Retained jumps, shape (n_retained,), length.
+
         Returns:
-            Whether it is gone for good (its force is zero and stays so).
+            Whether it has opened all the way (its force is zero and stays so).
         """
         w = bond.opening(jump)
         if bond.largest is not None:
@@ -201,23 +215,24 @@ class CohesiveBonds:
     # -- passing an unstable state -------------------------------------------------------------
 
     def snap(self, jump: Array, round_off: float | Array = 0.0) -> list[CohesiveBond]:
-        """Run downhill from an unstable equilibrium at constant load.
+        """Descend in energy from an unstable equilibrium to a stable one at constant load.
 
         Args:
-            jump: Soft jumps of the equilibrium, shape (r,).
-            round_off: That of the entries of S, a number or one per unknown.
+            jump: Softening jumps of the equilibrium, shape (r,), length.
+            round_off: That of the entries of S, a number or one per unknown, shape (n_last,),
+                force/length.
 
         Returns:
             Bonds that opened all the way; the branches of the others are set for the new state.
 
         Raises:
-            ComesApart: There is no end: nothing holds a body once bonds have opened.
+            ComesApart: There is no minimum: nothing holds a body once bonds have opened.
         """
         self.counts.snaps += 1
         directions, across = self._axes()
         stiffness = directions @ self.star @ directions.T
         if len(across):
-            # no force acts across the directions; what is loose there holds nothing
+            # no force acts across the directions; what has no stiffness there restrains nothing
             coupling = across @ self.star @ directions.T
             inner = np.linalg.pinv(across @ self.star @ across.T, rcond=_LOOSE, hermitian=True)
             stiffness -= coupling.T @ inner @ coupling

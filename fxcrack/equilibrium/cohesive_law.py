@@ -1,7 +1,7 @@
 """One bond that softens with its opening.
 
     F(w) = F0 (1 - w/w_f)            w the opening along F0, while it grows
-    F(w) = F(w_max) w/w_max          when it goes back (secant), w_max never heals
+    F(w) = F(w_max) w/w_max          when it decreases (secant), w_max never decreases
 
 Nodes of a second-order element edge share one such law: F0 and w go over all of their components.
 """
@@ -18,7 +18,7 @@ STIFFEST = 1e-7
 
 NEUTRAL = 1e-8
 """A state counts as unstable if it were so with bonds that soften faster by this fraction. A bond
-whose onset is found by exact crack closure is neutral there: round-off must not decide."""
+whose onset is found by exact crack closure is neutral there, up to round-off."""
 
 
 class CohesiveUnit(NamedTuple):
@@ -57,11 +57,11 @@ class CohesiveBond:
     largest: float | None = None
 
     def opening(self, jump: Array) -> float:
-        """W of a state."""
+        """Opening w at retained jumps of shape (n_retained,), length."""
         return float(self.direction @ jump[self.components])
 
     def force(self, opening: float) -> float:
-        """Tensile force at an opening on the present branch."""
+        """Tensile force at an opening (length) on the present branch, force."""
         if self.largest is None:
             return self._envelope(opening)
         return self._envelope(self.largest) + self.secant * (opening - self.largest)
@@ -70,7 +70,7 @@ class CohesiveBond:
         return self.strength * (1.0 - opening / self.final)
 
     def taken(self, opening: float) -> float:
-        """Energy the bond has taken up to an opening, the part it would give back included."""
+        """Energy the bond has taken up to an opening (length), the recoverable part included."""
         most = opening if self.largest is None else self.largest
         back = most - opening
         given_back = back * (self._envelope(most) - 0.5 * self.secant * back)

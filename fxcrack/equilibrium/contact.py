@@ -85,7 +85,15 @@ class ContactSystem(JumpSystem):
         return self.friction.condensed(self, extra)
 
     def rates(self, loads: Array, force: Array) -> tuple[Array, Array]:
-        """Change of jumps and conjugates per change of loads and given forces, states fixed."""
+        """Change of jumps and conjugates per change of loads and given forces, states fixed.
+
+        Args:
+            loads: Rates of the loads, shape (n_loads,).
+            force: Rates of the given forces, shape (n_retained,).
+
+        Returns:
+            Rates of the jumps, shape (n_retained,), and of the conjugates, shape (n_loads,).
+        """
         if self.friction is None:
             return super().rates(loads, force)
         return self.friction.rates(self, loads, force)
@@ -122,6 +130,10 @@ class ContactSystem(JumpSystem):
 
         A repeated set ends the active-set iteration; a non-negative least-squares problem with
         the same solution, whose solver terminates, takes over.
+
+        Args:
+            loads: Amplitudes of supports and load factors, shape (n_loads,).
+            force: Given forces, shape (n_retained,), force.
 
         Raises:
             ConvergenceError: Neither gives a solution.
@@ -264,12 +276,12 @@ class ContactSystem(JumpSystem):
     def _run_through(self, state: Equilibrium) -> Equilibrium:
         """The next stable equilibrium at constant load after an unstable one, contact included.
 
-        Contact stays as it is while bonds run open, and is put right afterwards.
+        Contact is kept fixed while bonds open unstably, and is corrected afterwards.
         """
         return self._put_right(state, self.pass_unstable(state))
 
     def _penetrates(self, state: Equilibrium) -> bool:
-        """Whether faces overlap where a bond is gone that let them.
+        """Whether faces overlap where a bond has opened all the way that allowed them to.
 
         While a bond softens its faces are not in contact, unless they were pressed from the start.
         """

@@ -51,7 +51,7 @@ class ContactBlock:
     """The contact problem at given loads.
 
     Attributes:
-        stiffness: K, shape (m d, m d), positive semidefinite.
+        stiffness: K, shape (m d, m d), positive semidefinite, force/length.
         gap: Initial gaps, shape (m,), length.
         mu: Friction coefficients, shape (m,).
         factored: The last matrix in the plane with its factor, by the key of its states.
@@ -70,7 +70,7 @@ class ContactBlock:
         return len(self.stiffness) // max(len(self.mu), 1)
 
     def forces(self, jump: Array, load: Array) -> Array:
-        """P of given jumps, shape (m, d)."""
+        """Contact forces p, shape (m, d), of jumps, shape (m, d), at a load g, shape (m d,)."""
         return np.asarray(self.stiffness @ jump.ravel() - load).reshape(jump.shape)
 
 
@@ -92,7 +92,13 @@ class NodeStates:
         return bytes(self.status.tobytes() + (signs + 0.0).tobytes())
 
     def switched(self, nodes: Ints, status: Ints, direction: Array) -> NodeStates:
-        """Other states at some nodes."""
+        """Other states at some nodes.
+
+        Args:
+            nodes: Which nodes, shape (k,).
+            status: Their new OPEN, STICK or SLIP, shape (k,).
+            direction: Their new slip directions, shape (k, d - 1).
+        """
         new = NodeStates(self.status.copy(), self.direction.copy())
         new.status[nodes], new.direction[nodes] = status, direction
         return new

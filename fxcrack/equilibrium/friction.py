@@ -41,9 +41,9 @@ class Friction:
         components: Retained jumps per node, -1 where a support holds one, shape (m, d).
         where: Pair and slave node, shape (m, 2).
         mu: Friction coefficients, shape (m,).
-        gap: Initial gaps, shape (m,).
+        gap: Initial gaps, shape (m,), length.
         states: What the nodes do now.
-        reference: Tangential jumps of the last accepted state, shape (m, d - 1).
+        reference: Tangential jumps of the last accepted state, shape (m, d - 1), length.
         error: Difference of the dissipation by the forces at the end of increments and by the mean
             of both ends, an estimate of the error in 3-D; 0 in 2-D.
         steps: Linear systems solved.
@@ -73,7 +73,7 @@ class Friction:
         direction: Array,
         reference: Array,
     ) -> None:
-        """Take more nodes, whose bonds are gone.
+        """Take more nodes, whose bonds are released.
 
         Args:
             components: Retained jumps, -1 where a support holds one, shape (k, d).
@@ -82,7 +82,7 @@ class Friction:
             gap: Initial gaps, shape (k,), length.
             status: OPEN, STICK or SLIP, shape (k,).
             direction: Slip directions, shape (k, d - 1).
-            reference: Present tangential jumps, shape (k, d - 1).
+            reference: Present tangential jumps, shape (k, d - 1), length.
         """
         mu = np.where((components[:, 1:] < 0).all(axis=1), 0.0, mu)
         status = np.where((mu == 0.0) & (status == STICK), SLIP, status)
@@ -96,7 +96,7 @@ class Friction:
         self._block = None
 
     def drop(self, k: int) -> None:
-        """Take back the last k nodes."""
+        """Remove the last k nodes."""
         n = len(self.mu) - k
         self.components, self.where = self.components[:n], self.where[:n]
         self.mu, self.gap, self.reference = self.mu[:n], self.gap[:n], self.reference[:n]
@@ -105,7 +105,7 @@ class Friction:
 
     @property
     def rows(self) -> Ints:
-        """Retained jumps of the block."""
+        """Retained jumps of the block, shape (n_block,)."""
         return self.components[self.components >= 0]
 
     def save(self) -> FrictionState:
@@ -137,7 +137,7 @@ class Friction:
         return np.where(self.components >= 0, values[np.maximum(self.components, 0)], 0.0)
 
     def over(self, block: Array, n_retained: int) -> Array:
-        """Values at the nodes as values of all retained jumps."""
+        """Values at the nodes, shape (m, d), as those of retained jumps, shape (n_retained,)."""
         out = np.zeros(n_retained)
         inside = self.components >= 0
         out[self.components[inside]] = block[inside]
@@ -159,7 +159,16 @@ class Friction:
         return known[2]
 
     def load(self, system: JumpSystem, loads: Array, force: Array) -> Array:
-        """G at loads and given forces, shape (m d,)."""
+        """Forces g on the block at loads and given forces.
+
+        Args:
+            system: The jump system.
+            loads: Amplitudes of supports and load factors, shape (n_loads,).
+            force: Given forces, shape (n_retained,), force.
+
+        Returns:
+            Shape (m d,), force.
+        """
         flat = self.components.ravel()
         inside = np.flatnonzero(flat >= 0)
         rows, free = flat[inside], system.cholesky.free
@@ -174,13 +183,13 @@ class Friction:
         return out
 
     def traction(self, system: JumpSystem, state: Equilibrium) -> Array:
-        """Contact forces on the slave side at a state, shape (m, d)."""
+        """Contact forces on the slave side at a state, shape (m, d), force."""
         load = self.load(system, state.loads, state.force)
         force = self.block(system).forces(self.of(state.jump), load)
         return np.where(self.components >= 0, force, 0.0)
 
     def dissipation(self, system: JumpSystem, a: Equilibrium, b: Equilibrium) -> float:
-        """Energy that friction takes on the way between two states, linear in between."""
+        """Energy that friction dissipates between two states, linear in between."""
         slip = (self.of(b.jump) - self.of(a.jump))[:, 1:]
         mean = 0.5 * (self.traction(system, a) + self.traction(system, b))[:, 1:]
         rough = self.mu > 0.0
@@ -200,6 +209,13 @@ class Friction:
 
         Friction forces count as given.
 
+        Args:
+            system: The jump system.
+            extra: Held components outside the block, shape (k,).
+
+        Returns:
+            Shape (k, k), force/length.
+
         Raises:
             NotPositiveDefinite: Nothing holds one of the open or slipping ones.
         """
@@ -212,6 +228,11 @@ class Friction:
 
     def rates(self, system: JumpSystem, loads: Array, force: Array) -> tuple[Array, Array]:
         """Rates of jumps, shape (n_retained,), and conjugates, shape (n_loads,), states fixed.
+
+        Args:
+            system: The jump system.
+            loads: Rates of the loads, shape (n_loads,).
+            force: Rates of the given forces, shape (n_retained,).
 
         Raises:
             ConvergenceError: A body slides.
@@ -236,6 +257,11 @@ class Friction:
     def equilibrium(self, system: JumpSystem, loads: Array, force: Array) -> Equilibrium:
         """One increment of backward Euler from the committed state.
 
+        Args:
+            system: The jump system.
+            loads: Amplitudes of supports and load factors at the end, shape (n_loads,).
+            force: Given forces at the end, shape (n_retained,), force.
+
         Raises:
             ConvergenceError: No solution was found.
         """
@@ -244,6 +270,10 @@ class Friction:
 
     def increment(self, block: ContactBlock, load: Array) -> Increment:
         """An increment of the block from the committed state; takes over its states.
+
+        Args:
+            block: K, gaps and friction coefficients of the nodes.
+            load: g at the end, shape (m d,), force.
 
         Raises:
             ConvergenceError: No solution was found.

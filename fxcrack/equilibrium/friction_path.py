@@ -53,12 +53,12 @@ def follow(
         friction: The contact nodes.
         system: The jump system.
         start: Equilibrium the present states belong to.
-        loads: Loads at the end.
-        force: Given forces at the end.
+        loads: Amplitudes of supports and load factors at the end, shape (n_loads,).
+        force: Given forces at the end, shape (n_retained,), force.
 
     Yields:
         (fraction of the way, equilibrium there), the last one at 1. States and committed slips
-        change only when the next piece is asked for.
+        change only when the next piece is requested.
 
     Raises:
         ConvergenceError: No equilibrium was found.
@@ -144,7 +144,7 @@ class _Way:
             stuck = stuck + 1 if step < _SAME else 0
             now = np.flatnonzero(fraction <= step + _SAME)
             if stuck > 8:
-                now = now[:1]  # least index first: it ends where all at once would go round
+                now = now[:1]  # least index first: terminates where all at once would cycle
             if step > 0.0:
                 x = self.at + step * (1.0 - self.at)
                 state = blend(self.last, self._state(1.0, end), step)

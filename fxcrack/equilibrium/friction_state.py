@@ -24,10 +24,10 @@ class FrictionWork:
     """Energy that friction dissipates in an increment predicted on a tangent, corrected at its end.
 
     Attributes:
-        predicted: Energy on the predicted path.
+        predicted: Energy on the predicted path, force times length.
         start: Tangential jumps at its beginning, shape (m, d - 1), length.
-        jump: Those predicted for its end.
-        traction: Tangential contact forces predicted there, shape (m, d - 1).
+        jump: Those predicted for its end, shape (m, d - 1), length.
+        traction: Tangential contact forces predicted there, shape (m, d - 1), force.
     """
 
     predicted: float
@@ -37,7 +37,7 @@ class FrictionWork:
 
     @classmethod
     def of(cls, system: ContactSystem, points: list[tuple[float, Equilibrium]]) -> FrictionWork:
-        """The predicted path, while the system still holds the tangent it was predicted on."""
+        """The predicted path, while the system still has the tangent it was predicted on."""
         friction = system.friction
         assert friction is not None
         end = points[-1][1]
@@ -69,7 +69,16 @@ def has_friction(pairs: list[Pair]) -> bool:
 
 
 def nodes_of(pair: Pair, front: Front, index: Ints) -> Ints:
-    """Slave nodes that may touch: open, paired, with a retained normal jump."""
+    """Slave nodes that may touch: open, paired, with a retained normal jump.
+
+    Args:
+        pair: The interface.
+        front: Its front.
+        index: Numbers of its retained jumps, -1 elsewhere, shape (n_nodes, gdim).
+
+    Returns:
+        Shape (k,).
+    """
     if not pair.interface.contact:
         return np.zeros(0, dtype=np.int64)
     return np.flatnonzero(~front.bonded & pair.paired & (index[:, 0] >= 0))
@@ -134,8 +143,16 @@ def contact_share(
 
     Pressure stays, and so does shear up to mu times the pressure: what exceeds it is released.
 
+    Args:
+        system: The dense system.
+        pair: The interface.
+        index: Numbers of its retained jumps, -1 elsewhere, shape (n_nodes, gdim).
+        nodes: Slave nodes, shape (k,).
+        state: Present equilibrium.
+
     Returns:
-        Forces on the slave side, shape (k, d); status and slip direction of the nodes.
+        Forces on the slave side, shape (k, d), force; status, shape (k,), and slip direction,
+        shape (k, d - 1), of the nodes.
     """
     friction = system.friction
     assert friction is not None
@@ -162,8 +179,17 @@ def release_to_contact(
 ) -> Array:
     """Move bonded nodes to the contact nodes.
 
+    Args:
+        system: The dense system.
+        p: Number of the pair.
+        pair: The interface.
+        index: Numbers of its retained jumps, -1 elsewhere, shape (n_nodes, gdim).
+        nodes: Slave nodes, shape (k,).
+        state: Present equilibrium.
+
     Returns:
-        Their bond forces less what contact takes over, shape (k, d).
+        Given forces, those of the nodes their bond forces less what contact takes over, shape
+        (n_retained,), force.
 
     Raises:
         NotPositiveDefinite: A body would come free; nothing is changed.

@@ -105,7 +105,7 @@ class GrowingCholesky:
         """Solve L y = right.
 
         Args:
-            right: Shape (n_free,) or (n_free, m).
+            right: Right-hand sides, shape (n_free,) or (n_free, m); y has the same shape.
             start: Entries of ``right`` before it are known to be zero.
         """
         n = len(self.free)
@@ -195,7 +195,7 @@ class GrowingCholesky:
         """Round-off of the pivot of one of the unknowns of a factor of S*.
 
         A body that is free but for round-off turns about a far support: the few unknowns with long
-        levers then carry the error, not the pivot's own diagonal entry.
+        lever arms then carry the error, not the pivot's own diagonal entry.
         """
         unit = np.zeros((len(extra), 1))
         unit[j] = tile[j, j]
@@ -208,7 +208,7 @@ class GrowingCholesky:
         """Hold unknowns again.
 
         Args:
-            gone: Their numbers in S.
+            gone: Their numbers in S, shape (k,); those that are not free are ignored.
 
         Returns:
             Position of the first one removed: rows before it are unchanged.

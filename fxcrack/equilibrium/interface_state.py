@@ -1,6 +1,6 @@
 """State of the interfaces by slave node, whatever jumps are retained.
 
-It is the one way back to an earlier state: within a set of retained jumps (a trial is given up),
+It is the one way back to an earlier state: within a set of retained jumps (a trial is rejected),
 on another one (a step begins, a front leaves the set), and from a checkpoint. States are carried
 over, never found anew: where a bond softens or faces slip, more than one equilibrium may belong to
 the same loads.
@@ -62,7 +62,15 @@ class InterfaceState:
         equilibrium: Equilibrium,
         friction_energy: float,
     ) -> InterfaceState:
-        """The present state of a system whose retained jumps are numbered by ``index``."""
+        """The present state of a system.
+
+        Args:
+            system: The dense system.
+            fronts: Fronts per pair.
+            index: Numbers of its retained jumps per pair, -1 elsewhere, shape (n_nodes, gdim).
+            equilibrium: Present equilibrium.
+            friction_energy: Energy dissipated by friction so far.
+        """
         bonded = [front.bonded.copy() for front in fronts]
         return cls(index, bonded, equilibrium, system.snapshot(), friction_energy)
 
@@ -186,7 +194,12 @@ class InterfaceState:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, npt.NDArray[Any]], n_pairs: int) -> InterfaceState:
-        """The state that :meth:`arrays` were made of, for ``n_pairs`` interfaces."""
+        """The state that :meth:`arrays` were made of.
+
+        Args:
+            arrays: By name, of the shapes that :meth:`arrays` gives.
+            n_pairs: Number of interfaces.
+        """
         index = [arrays[f"index[{p}]"].astype(np.int64) for p in range(n_pairs)]
         bonded = [arrays[f"bonded[{p}]"].astype(bool) for p in range(n_pairs)]
         n = max((int(i.max(initial=-1)) for i in index), default=-1) + 1
@@ -224,7 +237,14 @@ class InterfaceState:
 
 
 def allow_contact(system: ContactSystem, pair: Pair, front: Front, index: Ints) -> None:
-    """Mark the open normal components of a pair as possible contacts."""
+    """Mark the open normal components of a pair as possible contacts.
+
+    Args:
+        system: The dense system.
+        pair: The interface.
+        front: Its front.
+        index: Numbers of its retained jumps, -1 elsewhere, shape (n_nodes, gdim).
+    """
     normals = index[~front.bonded & pair.paired, 0]
     normals = normals[normals >= 0]
     system.touches[normals] = True

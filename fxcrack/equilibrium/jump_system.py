@@ -32,11 +32,11 @@ class Equilibrium:
 
     Attributes:
         loads: Amplitudes of supports and load factors, shape (n_loads,).
-        force: Given forces on free components, 0 elsewhere, shape (n_retained,).
+        force: Given forces on free components, 0 elsewhere, shape (n_retained,), force.
         jump: Jumps, shape (n_retained,), length.
         conjugate: Reactions of supports and displacements of load patterns, shape (n_loads,).
-        lost: Energy lost on the way here where contact changed in an unstable state: no force that
-            is given did that work.
+        lost: Energy lost since the last equilibrium where contact changed in an unstable state: no
+            given force did that work.
     """
 
     loads: Array
@@ -72,7 +72,8 @@ class JumpSystem:
     """States of the retained jumps and the linear equilibrium they lead to.
 
     Args:
-        schur: S over (retained jumps, supports, force patterns, monitors).
+        schur: S over (retained jumps, supports, force patterns, monitors), shape (n_last, n_last),
+            force/length between jumps.
         n_retained: Number of retained jumps.
         n_loads: Number of supports and force patterns together.
         n_forces: How many of these are force patterns (the last ones).
@@ -82,7 +83,7 @@ class JumpSystem:
         free: Components whose force is known, shape (n_retained,).
         closed: Normal components held by contact, shape (n_retained,).
         contact: Normal components that may be in contact now, shape (n_retained,).
-        touches: Normal components that may be in contact once their bond is gone, likewise.
+        touches: Normal components that may be in contact once their bond is released, likewise.
         gap: Initial gaps, shape (n_retained,), length.
         contact_steps: Number of active-set steps done, those on earlier sets of jumps included.
         seconds: Time spent following contact, friction or softening, by law.
@@ -122,6 +123,10 @@ class JumpSystem:
     def renew(self, schur: Array, offset: Array) -> None:
         """Take the tangent at another state of the continuum; the states stay as they are.
 
+        Args:
+            schur: S with the same numbering, shape (n_last, n_last), force/length between jumps.
+            offset: c, shape (n_last,), force at jumps.
+
         Raises:
             NotPositiveDefinite: The free components have no stable equilibrium with it.
         """
@@ -158,6 +163,9 @@ class JumpSystem:
 
     def release(self, components: Ints) -> None:
         """Free components; their forces are given from now on.
+
+        Args:
+            components: Numbers of retained jumps, shape (k,); free ones are ignored.
 
         Raises:
             NotPositiveDefinite: Nothing restrains one of them any more; nothing is changed.
@@ -203,7 +211,7 @@ class JumpSystem:
     def restore(self, saved: ComponentStates) -> None:
         """Return to earlier states of the same components.
 
-        What was held is held first: so nothing comes free on the way.
+        What was held is held first, so that no body comes free in between.
         """
         self.soft.finished = saved.finished
         self.soft.bonds = []
@@ -217,7 +225,11 @@ class JumpSystem:
         self.soft.refresh(self.cholesky)
 
     def hold(self, components: Ints) -> None:
-        """Hold components again (contact)."""
+        """Hold components again (contact).
+
+        Args:
+            components: Numbers of retained jumps, shape (k,).
+        """
         self.cholesky.remove(components)
         self.free[components] = False
         self._forward = self.cholesky.forward(self._load_columns_at(self.cholesky.free))
@@ -275,9 +287,9 @@ class JumpSystem:
 
         Args:
             loads: Amplitudes of supports and load factors, shape (n_loads,).
-            force: Given forces, shape (n_retained,).
-            held: Jumps of the components that are not free, shape (n_retained,); by default 0,
-                closed normals at -gap.
+            force: Given forces, shape (n_retained,), force.
+            held: Jumps of the components that are not free, shape (n_retained,), length; by default
+                0, closed normals at -gap.
         """
         free = self.cholesky.free
         jump = np.where(self.closed, -self.gap, 0.0) if held is None else held.copy()
@@ -334,12 +346,12 @@ class JumpSystem:
         jump[self.cholesky.free] -= self.cholesky.backward(self.soft.coupling @ soft)
         jump[mine] = soft
         force = force.copy()
-        # as the bodies feel them: a stiff branch times the round-off of an opening is much more
+        # as they act on the bodies: a stiff branch times the round-off of an opening is much more
         force[mine] = self._product(mine, np.concatenate([jump, loads]))
         return force
 
     def pass_unstable(self, state: Equilibrium) -> Equilibrium:
-        """Run downhill from an unstable state to the next stable one, at constant load."""
+        """Descend in energy from an unstable state to the next stable one, at constant load."""
         mine = self.soft.components
         self.finish(self.soft.snap(state.jump[mine], self.cholesky.round_off))
         given = state.force.copy()
@@ -351,15 +363,15 @@ class JumpSystem:
         return np.asarray(self.closed | (state.force != 0.0))
 
     def reduced(self, extra: Ints) -> Array:
-        """S on held components once the free ones are condensed out, shape (k, k)."""
+        """S on held components once the free ones are condensed out, shape (k, k), force/length."""
         return self.cholesky.reduced(extra)[1]
 
     def forces(self, state: Equilibrium, rows: Ints) -> Array:
-        """Interface forces on the slave side at some components, shape (len(rows),)."""
+        """Interface forces on the slave side at some components, shape (len(rows),), force."""
         return self._product(rows, np.concatenate([state.jump, state.loads]))
 
     def monitors(self, state: Equilibrium) -> Array:
-        """Monitored displacements, shape (n_monitors,)."""
+        """Monitored displacements, shape (n_monitors,), length."""
         return self._product(self.monitor_rows, np.concatenate([state.jump, state.loads]))
 
     def strain_energy(self, state: Equilibrium) -> float:
@@ -376,7 +388,7 @@ def blend(a: Equilibrium, b: Equilibrium, x: float) -> Equilibrium:
 
 
 def work_between(a: Equilibrium, b: Equilibrium, n_forces: int) -> float:
-    """External work along a linear piece: supports move, force patterns are followed."""
+    """External work of supports and force patterns along a linear piece."""
     n = len(a.loads) - n_forces
     by_supports = 0.5 * (a.conjugate + b.conjugate)[:n] @ (b.loads - a.loads)[:n]
     by_forces = 0.5 * (a.loads + b.loads)[n:] @ (b.conjugate - a.conjugate)[n:]

@@ -22,29 +22,29 @@ def snap_through(
     w: Array,
     largest: Array,
 ) -> tuple[Bools, Array, int]:
-    """Run downhill from an unstable equilibrium to a stable one; w_max never heals.
+    """Descend in energy from an unstable equilibrium to a stable one; w_max never decreases.
 
     The energy 1/2 (w - w_1)^t K (w - w_1) - F_1^t (w - w_1) + sum of what the bonds take, with
     the openings w_1 and forces F_1 of the equilibrium it starts from, is piecewise quadratic.
     Each step follows Newton's direction, or that of negative curvature, to the next change of a
     branch: a bond opens all the way, one that went back opens again. The force is continuous where
-    a bond turns back, so no energy comes from nowhere.
+    a bond turns back, so no energy is created there.
 
     Args:
-        held: F_1, shape (n,).
-        stiffness: K, forces per opening, shape (n, n).
-        least: Stiffness below which nothing is held.
-        strength: F0, shape (n,).
-        final: w_f, shape (n,).
-        w: w_1, shape (n,).
-        largest: w_max, shape (n,).
+        held: F_1, shape (n,), force.
+        stiffness: K, forces per opening, shape (n, n), force/length.
+        least: Stiffness below which nothing is held, force/length.
+        strength: F0, shape (n,), force.
+        final: w_f, shape (n,), length.
+        w: w_1, shape (n,), length.
+        largest: w_max, shape (n,), length.
 
     Returns:
-        Bonds that soften at the end (the others are gone, or hold on the secant branch), largest
-        openings, number of steps.
+        Bonds that soften at the end (the others have opened all the way, or are on the secant
+        branch), shape (n,); largest openings, shape (n,), length; number of steps.
 
     Raises:
-        ComesApart: The energy falls for ever: nothing holds a body once bonds have opened.
+        ComesApart: The energy has no minimum: nothing holds a body once bonds have opened.
     """
     slope = strength / final
     start = w
@@ -102,7 +102,7 @@ def _direction(
         if stable:
             direction = -np.linalg.solve(curvature, gradient)
         else:
-            # downhill, and where that is level towards opening
+            # down the energy, and where it is level towards opening
             direction = vectors[:, 0]
             tilt = float(gradient @ direction)
             if tilt > level:

@@ -98,7 +98,12 @@ class Solver(Protocol):
         """
 
     def holds(self, p: int, nodes: Ints) -> bool:
-        """Whether all jumps of some slave nodes that may differ from zero are retained."""
+        """Whether all jumps of some slave nodes that may differ from zero are retained.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, shape (n,).
+        """
 
     # -- from equilibrium to equilibrium -------------------------------------------------
 
@@ -131,7 +136,8 @@ class Solver(Protocol):
         """Take a state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
 
         Args:
-            arrays: The same on all ranks, of any number of ranks.
+            arrays: By name, of the shapes that :meth:`collect` gave; the same on all ranks, of any
+                number of ranks.
             time: Time of the state.
 
         Raises:
@@ -146,7 +152,7 @@ class Solver(Protocol):
         Args:
             p: Number of the pair.
             nodes: Slave nodes, shape (n,).
-            force: Given forces afterwards, shape (n_retained,).
+            force: Given forces afterwards, shape (n_retained,), force.
 
         Returns:
             Energy released by the bond forces on their way, and external work.
@@ -181,7 +187,15 @@ class Solver(Protocol):
     # -- energies ------------------------------------------------------------------------
 
     def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
-        """External work, energy released by bonds, and mean jumps of a piece of the load path."""
+        """External work, energy released by bonds, and mean jumps of a piece of the load path.
+
+        Args:
+            here: Equilibrium at its beginning.
+            point: Equilibrium at its end.
+
+        Returns:
+            Two energies, and the mean jumps, shape (n_retained,), length.
+        """
 
     def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
         """Add what friction dissipates along a piece of the load path to its energy."""

@@ -52,7 +52,7 @@ class DeformedInterfaces:
         return any(m is not None for m in self._masters)
 
     def jumps(self, u: PETSc.Vec, coordinates: JumpCoordinates) -> Array:
-        """Retained jumps in a displacement, shape (n_retained,); collective."""
+        """Retained jumps in a displacement, shape (n_retained,), length; collective."""
         values = self._reader.gather(u.array_r)
         out = np.zeros(coordinates.n_retained)
         for pair, frames, index in zip(
@@ -97,7 +97,13 @@ class DeformedInterfaces:
         return changed
 
     def pairing(self) -> list[dict[str, npt.NDArray[Any]]]:
-        """What renewed pairings have changed, per pair; the same on any number of ranks."""
+        """What renewed pairings have changed, per pair; the same on any number of ranks.
+
+        Returns:
+            Arrays by name, those of :class:`~fxcrack.interface.pairing.Pair` and of their shapes:
+            paired and gap, shape (n_nodes,), masters (nodes of the master surface) and weights,
+            shape (n_nodes, k), frames, shape (n_nodes, gdim, gdim).
+        """
         return [
             {} if master is None else changing(pair, master)
             for pair, master in zip(self._pairs, self._masters, strict=True)
@@ -107,7 +113,7 @@ class DeformedInterfaces:
         """Take over pairings from :meth:`pairing`.
 
         Args:
-            arrays: Its values by ``key.format(name, p)``.
+            arrays: Its values by ``key.format(name, p)``, of the same shapes.
             key: Format of their names.
         """
         for p, master in enumerate(self._masters):
@@ -157,7 +163,7 @@ class PairingEnergy:
         self.forget()
 
     def forget(self) -> None:
-        """Give up a pairing whose equilibrium is not wanted."""
+        """Discard a pairing whose equilibrium has not been accepted."""
         if self._before is not None:
             self._before.destroy()
             self._before = None

@@ -20,7 +20,7 @@ from fxcrack.base.errors import ConvergenceError
 from fxcrack.equilibrium.contact import Equilibrium, bond_work
 
 FINE = 1.0 / 512.0
-"""Part of an increment, or of a bond force, that is taken whole whatever the energies are."""
+"""Part of an increment, or of a bond force, that is not divided whatever the energies are."""
 
 
 class EnergyImbalance(ConvergenceError):
@@ -35,7 +35,7 @@ class IncrementWork:
         start: Where it begins.
         end: Where it ends.
         conjugate: Integral of the conjugates over s, shape (n_loads,).
-        jump: Integral of the jumps over s, shape (n_retained,).
+        jump: Integral of the jumps over s, shape (n_retained,), length.
         bonds: Energy released by bonds whose force falls.
         friction: Energy dissipated by friction.
     """
@@ -67,8 +67,9 @@ class TrialIncrement:
     Attributes:
         points: Pieces of the predicted path with the fraction at which each ends.
         end: The equilibrium found.
-        rate: Rates of jumps and conjugates at the start, by the tangent there.
-        soft: Components that softened at the start.
+        rate: Rates of jumps, shape (n_retained,), and conjugates, shape (n_loads,), per s at the
+            start, by the tangent there.
+        soft: Components that softened at the start, shape (n_soft,).
         iterations: Iterations it took.
         friction: Energy dissipated by friction.
         at: Time of the end.
@@ -100,10 +101,11 @@ class TrialIncrement:
         """Work along the increment.
 
         Args:
-            after: Rates of jumps and conjugates at the end, by the tangent there.
-            soft: Components that soften there.
-            trapezoidal: Straight from start to end, for bodies whose terms count so: with the same
-                rule here nothing is lost.
+            after: Rates of jumps, shape (n_retained,), and conjugates, shape (n_loads,), per s at
+                the end, by the tangent there.
+            soft: Components that soften there, shape (n_soft,).
+            trapezoidal: Straight from start to end, for bodies whose terms use the trapezoidal
+                rule: the energy balance is then exact.
         """
         end, points = self.end, self.points
         here, predicted = points[0][1], points[-1][1]

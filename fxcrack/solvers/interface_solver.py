@@ -299,7 +299,12 @@ class InterfaceSolver(ABC):
     # -- what criteria and output ask ----------------------------------------------------
 
     def holds(self, p: int, nodes: Ints) -> bool:
-        """Whether all jumps of some slave nodes that may differ from zero are retained."""
+        """Whether all jumps of some slave nodes that may differ from zero are retained.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, shape (n,).
+        """
         pair, index, held = self.pairs[p], self.index[p], self.held_by_supports[p]
         missing = (index[nodes] < 0) & ~held[nodes]
         if pair.interface.normal_only:

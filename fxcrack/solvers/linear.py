@@ -170,7 +170,7 @@ class LinearSolver(InterfaceSolver):
         system, loads = self.system, before.equilibrium.loads
         if system.friction is None:
             return system.linear(loads, force)
-        # what slips and what sticks cannot be told from the loads: the jumps say it
+        # slip and stick do not follow from the loads: they follow from the jumps
         jump = before.values(before.equilibrium.jump, self.index, system.n_retained)
         held = system.friction.over(system.friction.of(jump), system.n_retained)
         return system.linear(loads, force, held)
@@ -186,7 +186,7 @@ class LinearSolver(InterfaceSolver):
         Args:
             p: Number of the pair.
             nodes: Slave nodes, shape (n,).
-            force: Given forces afterwards, shape (n_retained,).
+            force: Given forces afterwards, shape (n_retained,), force.
 
         Returns:
             Energy released by the bond forces on their way, and external work.
@@ -222,17 +222,30 @@ class LinearSolver(InterfaceSolver):
         self.restore_interfaces(saved)
 
     def collect(self) -> Arrays:
-        """The present state as plain arrays; see :meth:`InterfaceState.arrays`."""
+        """The present state as plain arrays; names and shapes: :meth:`InterfaceState.arrays`."""
         return self.interface_state().arrays()
 
     def resume(self, arrays: Arrays, time: float) -> None:
-        """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over."""
+        """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
+
+        Args:
+            arrays: By name, of the shapes that :meth:`collect` gave.
+            time: Time of the state; linear bodies do not use it.
+        """
         self._resume(InterfaceState.from_arrays(arrays, len(self.pairs)))
 
     # -- energies and fields -------------------------------------------------------------
 
     def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
-        """External work, energy out through bonds, mean jumps of a linear piece."""
+        """External work, energy released by bonds, mean jumps of a linear piece.
+
+        Args:
+            here: Equilibrium at its beginning.
+            point: Equilibrium at its end.
+
+        Returns:
+            Two energies, and the mean jumps, shape (n_retained,), length.
+        """
         work = work_between(here, point, len(self.loads))
         return work, bond_work(here, point), 0.5 * (here.jump + point.jump)
 

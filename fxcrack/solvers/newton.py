@@ -1,4 +1,4 @@
-"""Nonlinear bodies: from one equilibrium to the next, accepted or given up.
+"""Nonlinear bodies: from one equilibrium to the next, accepted or rejected.
 
 Between two accepted states the dense system holds the tangent: it predicts the path, SNES corrects
 the end (:mod:`fxcrack.solvers.increment_work`).
@@ -207,7 +207,7 @@ class NewtonSolver(InterfaceSolver):
     def _solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
         if self.bodies.dynamic:
-            force = self.state.force  # nothing happens in no time
+            force = self.state.force  # no motion over a zero time step
         self.move(self.state.loads, force, self.at, 0.0, follow=False)
         self.commit()
 
@@ -224,12 +224,12 @@ class NewtonSolver(InterfaceSolver):
     ) -> Equilibrium:
         """Find the equilibrium at other loads and given forces; collective.
 
-        The result is a trial until :meth:`commit`; :meth:`revert` gives it up. The dense system's
+        The result is a trial until :meth:`commit`; :meth:`revert` rejects it. The dense system's
         contact and softening states are those of the trial.
 
         Args:
-            loads: Shape (n_loads,).
-            force: Shape (n_retained,).
+            loads: Amplitudes of supports and load factors at the end, shape (n_loads,).
+            force: Given forces at the end, shape (n_retained,), force.
             at: Time of the end.
             dt: Time since the accepted state.
             follow: Follow contact and softening on the path; else go straight to the end.
@@ -320,7 +320,7 @@ class NewtonSolver(InterfaceSolver):
             self.bodies.commit()
 
     def revert(self) -> None:
-        """Give up the last trial; collective."""
+        """Reject the last trial; collective."""
         self.restore_interfaces(self._before)
         self._return()
 
@@ -441,7 +441,7 @@ class NewtonSolver(InterfaceSolver):
             term.restore(kept)
         same = all(a is b for a, b in zip(saved.pairs, self.pairs, strict=True))
         if not (same and here):
-            self.tangent.accept()  # that of a state which is given up as well
+            self.tangent.accept()  # that of a state which is rejected as well
             self.tangent.drift = np.inf
         if same:
             self.restore_interfaces(saved.interfaces)
@@ -460,7 +460,8 @@ class NewtonSolver(InterfaceSolver):
         Returns:
             What :meth:`InterfaceState.arrays` gives; on rank 0 bodies.* of
             :meth:`WeakForm.state`; pairing.*[p] where faces slide far; dense.*, the dense system,
-            which need not be that of the accepted displacement; sums.
+            which need not be that of the accepted displacement: schur, shape (n_last, n_last),
+            offset, shape (n_last,), faces, shape (n_retained, n_forces); sums, shape (4,).
         """
         assert self.system.offset is not None
         out = self.interface_state().arrays()
@@ -479,7 +480,8 @@ class NewtonSolver(InterfaceSolver):
         Collective.
 
         Args:
-            arrays: The same on all ranks, of any number of ranks.
+            arrays: By name, of the shapes that :meth:`collect` gave; the same on all ranks, of any
+                number of ranks.
             time: Time of the state.
 
         Raises:
@@ -505,7 +507,15 @@ class NewtonSolver(InterfaceSolver):
     # -- energies and fields -------------------------------------------------------------
 
     def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
-        """External work, energy out through bonds, mean jumps of the last trial."""
+        """External work, energy released by bonds, mean jumps of the last trial.
+
+        Args:
+            here: Equilibrium at its beginning.
+            point: Equilibrium at its end.
+
+        Returns:
+            Two energies, and the mean jumps, shape (n_retained,), length.
+        """
         work = self._work_of(here, point)
         return work.external_work(len(self.loads)), work.bonds, work.jump
 

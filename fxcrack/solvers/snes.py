@@ -142,7 +142,7 @@ class InterfaceSnes:
         """Whether slow progress of shortened steps is put up with."""
 
     def _worn(self) -> bool:
-        """Whether a new tangent comes cheaper than going on with the present one."""
+        """Whether a new tangent costs less than continuing with the present one."""
         if not self.options.reuse:
             return True
         if self._steps_since == 0:
@@ -300,7 +300,7 @@ class InterfaceSnes:
         return 0
 
     def again(self, known: Array, *, whole: bool) -> None:
-        """Be ready for another run of SNES from the iterate at which the last one got nowhere.
+        """Be ready for another run of SNES from the iterate at which the last one stalled.
 
         Args:
             known: Interface forces there, shape (n_retained,).
@@ -350,7 +350,7 @@ class _StepSolver:
 def solve(problem: InterfaceSnes, y: PETSc.Vec) -> int:
     """Drive SNES from an initial y to equilibrium; collective.
 
-    Steps are shortened where the residual would grow. Where that gets nowhere whole ones are tried,
+    Steps are shortened where the residual would grow. Where that stalls, full ones are tried,
     and if they fail shortened ones after all.
 
     Args:

@@ -84,7 +84,8 @@ class CondensedTangent:
         """Compile the forms and make the borders on first use; collective.
 
         Args:
-            followed: Sets of this rank's nodes whose mean displacement is wanted.
+            followed: Sets of this rank's nodes whose mean displacement is wanted, each of shape
+                (n,).
 
         Returns:
             Number of borders.
@@ -137,7 +138,7 @@ class CondensedTangent:
         return self._version != self.bodies.version
 
     def release_memory(self) -> None:
-        """Free the tangents of a set of retained jumps that is given up; collective."""
+        """Free the tangents of a set of retained jumps that is discarded; collective."""
         self._drop_spare()
         if self._condensation is not None:
             self._condensation.destroy()
@@ -221,7 +222,11 @@ class CondensedTangent:
         return residual
 
     def border_values(self) -> Array:
-        """Minus the work of each force pattern, then the monitors, at the bodies' displacement."""
+        """Minus the work of each force pattern, then the monitors, at the bodies' displacement.
+
+        Returns:
+            Values of shape (n_borders,): work per unit load factor, monitors in units of length.
+        """
         u = self.bodies.u.x.petsc_vec
         return np.array([float(border.dot(u)) for border in self.borders])
 
@@ -235,8 +240,8 @@ class CondensedTangent:
         Args:
             system: The dense system on the same retained jumps.
             residual: Forces there, r, from :meth:`out_of_balance`.
-            jump: Retained jumps there, shape (n_retained,).
-            loads: Shape (n_loads,).
+            jump: Retained jumps there, shape (n_retained,), length.
+            loads: Amplitudes of supports and load factors there, shape (n_loads,).
 
         Returns:
             A_11^-1 r_1, which the caller destroys.
@@ -252,8 +257,8 @@ class CondensedTangent:
         Args:
             system: The dense system on the same retained jumps.
             values: Forces of the last coordinates and values of the borders, shape (n_last,).
-            jump: Retained jumps, shape (n_retained,).
-            loads: Shape (n_loads,).
+            jump: Retained jumps, shape (n_retained,), length.
+            loads: Amplitudes of supports and load factors, shape (n_loads,).
         """
         x, schur = np.concatenate([jump, loads]), self.condensation.schur
         system.renew(schur, values - schur[:, : len(x)] @ x)

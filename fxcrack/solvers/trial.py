@@ -17,8 +17,8 @@ from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
 
 _FAR_OFF = 1e-5
-"""A tangent made where more than this part of the forces was out of balance gives way to that of
-the state itself when one is accepted."""
+"""A tangent made where more than this part of the forces was out of balance is replaced by that
+of the state itself when one is accepted."""
 _NOISE = 10.0
 """Energies of an increment may be off by so many times the residual left times the step."""
 
@@ -64,8 +64,8 @@ class IncrementSolver:
             system: The dense system, in the accepted state.
             here: The accepted equilibrium.
             u: Its displacement, owned dofs.
-            loads: Shape (n_loads,).
-            force: Shape (n_retained,).
+            loads: Amplitudes of supports and load factors at the end, shape (n_loads,).
+            force: Given forces at the end, shape (n_retained,), force.
             at: Time of the end.
             follow: Follow contact and softening on the path; else go straight to the end.
             largest_force: Largest norm of the internal forces of an accepted state, force.
