@@ -73,7 +73,7 @@ _FORMER_NAMES = {
     "Progressive": "ProgressiveRelease",
     "Step": "StepRelease",
 }
-"""Deprecated public names; they go with the next release."""
+"""Deprecated public names; they are removed in the next release."""
 
 
 def __getattr__(name: str) -> object:

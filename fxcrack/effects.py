@@ -1,4 +1,4 @@
-"""Effects a scene may ask for, and the solver they need.
+"""Effects a scene may include, and the solver they need.
 
 A bare scene is linear and condensed once. Each effect adds one form term in the bodies, one load
 pattern or one law of the interface; what is not named does not exist in the scene: no form, no
@@ -85,7 +85,7 @@ def plan(
 
     Args:
         continuum: Bodies with their materials and temperature.
-        effects: What the scene asks for.
+        effects: The effects of the scene.
         loads: Its force patterns.
         interfaces: Its interfaces.
         solver: The solver the user insists on, ``None`` for the cheapest that will do.

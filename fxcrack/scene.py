@@ -151,7 +151,7 @@ class Scene:
         analysis: What the scene is made of and all that changes while its steps are run.
 
     Raises:
-        InputError: The parts contradict each other; the message says which and how to mend it.
+        InputError: The parts contradict each other; the message says which and how to correct it.
     """
 
     def __init__(
@@ -287,13 +287,13 @@ class Scene:
                 :mod:`fxcrack.error_estimate`), which is kept in ``history.details``.
             save: File (.csv or .json) that holds the history while the step runs.
             checkpoint: Where and how often the state is saved.
-            restart: Go on from the checkpoint if there is one; with the same scene and step, on
+            restart: Continue from the checkpoint if there is one; with the same scene and step, on
                 any number of ranks.
 
         Raises:
             AccuracyError: The accuracy is not reached, or cannot be judged; says what would reach
                 it. The history is kept.
-            InputError: The scene and the step do not go together, or the checkpoint belongs to
+            InputError: The scene and the step are not compatible, or the checkpoint belongs to
                 another scene.
             Interrupted: Ctrl-C or SIGTERM came while ``save`` or ``checkpoint`` was given.
         """

@@ -20,7 +20,7 @@ TARGETS = (0.05, 0.01, 0.001)
 
 
 def pareto_front(seconds: npt.ArrayLike, errors: npt.ArrayLike, *, gain: float = GAIN) -> list[int]:
-    """Positions of the points that no other point beats, fastest first.
+    """Positions of the points that no other point dominates, fastest first.
 
     Of points equal in both the first one is taken. Points that are not finite are left out.
 

@@ -18,7 +18,7 @@ _GUESS = 1.2
 _POSSIBLE = (0.8, 1.8)
 """Exponents outside are noise or overheads: large problems cost between n and n^1.8."""
 FIT_POINTS = 4
-"""The largest problems of a line tell its exponents,"""
+"""The largest problems of a line determine its exponents,"""
 FIT_RANGE = 1.5
 """those within so many decades below the largest."""
 _FIRST = 0.5
@@ -38,7 +38,12 @@ class PowerLaw:
 
 
 def fit_power(x: npt.ArrayLike, y: npt.ArrayLike) -> PowerLaw | None:
-    """Fit a power to positive points; ``None`` for fewer than two different x."""
+    """Fit a power to positive points; ``None`` for fewer than two different x.
+
+    Args:
+        x: Abscissas, shape (n,).
+        y: Ordinates, shape (n,). Points that are not positive and finite are left out.
+    """
     a, b = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
     good = (a > 0.0) & (b > 0.0) & np.isfinite(a) & np.isfinite(b)
     a, b = np.log(a[good]), np.log(b[good])
@@ -50,15 +55,15 @@ def fit_power(x: npt.ArrayLike, y: npt.ArrayLike) -> PowerLaw | None:
 
 
 def unknowns(setting: Setting) -> float:
-    """Number the unknowns of a setting go with: (order/size)^dimension."""
+    """Number the unknowns of a setting are proportional to: (order/size)^dimension."""
     return float((setting.order / setting.size) ** setting.dimension)
 
 
 def predict(setting: Setting, done: Mapping[Setting, float]) -> float:
     """Seconds a setting will take, from those that others took.
 
-    The last points of the same line tell the exponent; without any, the nearest in unknowns of the
-    same dimension scales with a guessed one.
+    The last points of the same line determine the exponent; without any, the nearest in unknowns
+    of the same dimension is scaled with an assumed one.
 
     Args:
         setting: What is to be run.
@@ -110,8 +115,8 @@ def extrapolate(sizes: Sequence[float], values: Sequence[float]) -> tuple[float,
 
         v(h) = v0 + c h^p,      p = log((v1 - v2)/(v2 - v3)) / log r
 
-    for sizes in one ratio r. p is kept between 1/2 and 2 (a larger one shows sizes too coarse to
-    tell), and is 1 for two sizes or where the values do not approach each other.
+    for sizes in one ratio r. p is kept between 1/2 and 2 (a larger one shows that the sizes are too
+    coarse), and is 1 for two sizes or where the values do not approach each other.
 
     Args:
         sizes: Coarse to fine.

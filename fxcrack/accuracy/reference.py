@@ -19,7 +19,7 @@ MAIN = ("load", "G", "length")
 _OTHERS = 2
 """How many lines beside the best say how well it is known."""
 _COMPARABLE = 3.0
-"""Lines that change more than so many times as much as the best one say nothing about it."""
+"""Lines that change more than so many times as much as the best one are not compared with it."""
 _TOLD = 3
 """Sizes a line needs to be trusted; two are taken only where no line has more."""
 

@@ -113,7 +113,7 @@ class Setting:
 
 @dataclass(frozen=True)
 class Measured:
-    """What a run of a case gave, or a closed form says; ``None`` for what the case has not.
+    """What a run of a case gave, or a closed form gives; ``None`` for what the case has not.
 
     Args:
         load: Critical load.
@@ -135,7 +135,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """What theory says about a case.
+    """Theoretical values of a case.
 
     Args:
         source: Whose theory, e.g. "Sneddon 1946".
@@ -274,5 +274,5 @@ def along(rows: list[Row], at: str, value: float, column: str) -> float:
 
 
 def as_number(value: npt.ArrayLike) -> float:
-    """A number of Python from whatever numpy made of it."""
+    """A Python number from an array of shape ()."""
     return float(np.asarray(value, dtype=float))

@@ -171,7 +171,7 @@ def main() -> None:
         answer: dict[str, Any]
         try:
             answer = {"result": run(study, Setting(**request), comm)}
-        except Exception as error:  # a scene function may raise anything: the study goes on
+        except Exception as error:  # a scene function may raise anything: the study continues
             answer = {"error": f"{type(error).__name__}: {error}"}
         if comm.rank == 0 or ("error" in answer and not all_arrive(failures, _PATIENCE)):
             print(MARK + json.dumps(answer), file=answers, flush=True)

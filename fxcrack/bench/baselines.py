@@ -42,7 +42,7 @@ class Response:
 
     Attributes:
         jump: Retained jumps, shape (n_retained,), length.
-        force: Interface forces of the retained jumps, shape (n_retained,).
+        force: Interface forces of the retained jumps, shape (n_retained,), force.
         load: Reaction of the upper arm's end, force.
     """
 
@@ -91,7 +91,7 @@ class Matrices:
         return self.coordinates.n_retained
 
     def last(self, vector: PETSc.Vec) -> Array:
-        """The entries of retained jumps and supports of a vector, on every rank; collective."""
+        """Entries of a vector at retained jumps and supports, shape (n_last,); collective."""
         out = np.empty(self.coordinates.n_last)
         if self.comm.rank == 0:
             out[:] = vector.array_r[self.coordinates.n_inner :]
@@ -99,7 +99,14 @@ class Matrices:
         return out
 
     def global_rows(self, local: Ints) -> npt.NDArray[np.integer]:
-        """Global numbers of some last coordinates, on rank 0 alone."""
+        """Global numbers of some last coordinates, on rank 0 alone.
+
+        Args:
+            local: Their numbers among the retained jumps and supports, shape (n,).
+
+        Returns:
+            Array of shape (n,) on rank 0, (0,) on the others.
+        """
         mine = self.coordinates.first + local if self.comm.rank == 0 else local[:0]
         return np.asarray(mine, dtype=PETSc.IntType)
 
@@ -119,7 +126,11 @@ class Refactor:
         self._vectors = [matrices.matrix.createVecRight() for _ in range(2)]
 
     def respond(self, free: Bools) -> Response:
-        """Equilibrium at opening 1; one numeric factorisation and one back-solve."""
+        """Equilibrium at opening 1; one numeric factorisation and one back-solve.
+
+        Args:
+            free: Whether each retained component is free, shape (n_retained,).
+        """
         of, (q, right) = self._of, self._vectors
         n = of.n_retained
         of.matrix.copy(self._work, structure=PETSc.Mat.Structure.SAME_NONZERO_PATTERN)
@@ -205,7 +216,11 @@ class Columns:
         return self._known[c]
 
     def respond(self, free: Bools) -> Response:
-        """Equilibrium at opening 1 from the columns of the free components."""
+        """Equilibrium at opening 1 from the columns of the free components.
+
+        Args:
+            free: Whether each retained component is free, shape (n_retained,).
+        """
         n = self._of.n_retained
         ends = n + np.array([self._of.upper, self._of.lower])
         pull = 0.5 * (self.column(int(ends[0])) - self.column(int(ends[1])))

@@ -35,7 +35,7 @@ class Task:
     Attributes:
         dofs: Displacement dofs.
         dim: 2 or 3.
-        window: Jump components that open or are watched in all.
+        window: Number of retained jumps, components that open or are watched.
         releases: Events.
         shape: "block" (compact) or "plate" (slender arms), which decides the iterations.
 
@@ -156,7 +156,7 @@ def advise(
     ranks: int | None = None,
     constants: Constants | None = None,
 ) -> list[CostEstimate]:
-    """Estimates of all methods that fit, the best first; on as many ranks as their memory asks for.
+    """Estimates of all methods that fit, the best first; on as many ranks as their memory needs.
 
     Args:
         task: What.
@@ -178,5 +178,5 @@ def advise(
             if ranks is not None or p >= _MOST_RANKS:
                 break
             p *= 2
-    # what counts is the time on the cores used: more ranks are paid for
+    # ranked by core time: seconds times ranks
     return sorted(fit, key=lambda e: e.total_seconds * e.ranks)

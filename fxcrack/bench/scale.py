@@ -131,7 +131,7 @@ def suite(
 
 
 def measure(case: ScaleCase, comm: MPI.Intracomm) -> Result:
-    """Run a case in the processes at hand; collective, the same result on every rank."""
+    """Run a case in the present processes; collective, the same result on every rank."""
     before = peak_memory(comm)
     comm.Barrier()
     clock = [time.perf_counter()]

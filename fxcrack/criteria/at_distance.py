@@ -40,7 +40,12 @@ class Stencil:
 
     @classmethod
     def of(cls, parts: list[tuple[Ints, Array]], order: int) -> Stencil:
-        """Stack the parts of several tips; a single node is repeated with weight 0."""
+        """Stack the parts of several tips; a single node is repeated with weight 0.
+
+        Args:
+            parts: Slave nodes and weights of each tip, both of shape (order + 1,) or (1,).
+            order: Order of the faces, 1 or 2.
+        """
         k = order + 1
         nodes, weights = np.zeros((len(parts), k), dtype=np.int64), np.zeros((len(parts), k))
         for i, (n, w) in enumerate(parts):
@@ -93,7 +98,7 @@ class _AtDistance(Evaluator):
         raise NotImplementedError
 
     def _check_start(self) -> None:
-        """Find the stencils of the initial tips, which complains about a wrong distance."""
+        """Find the stencils of the initial tips, which raises InputError for a wrong distance."""
         tips = self.front.tips()
         if len(tips):
             self.stencil(tips)

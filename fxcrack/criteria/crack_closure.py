@@ -43,7 +43,7 @@ def opens(force: npt.ArrayLike, jump: npt.ArrayLike) -> npt.NDArray[np.bool_]:
 def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike) -> Array:
     """Split the closure energy of units by mode.
 
-    A unit pressed together (:func:`opens` says no) stays closed when released: its G_I is zero.
+    A unit pressed together (:func:`opens` is False) stays closed when released: its G_I is zero.
     The sum of its forces decides, not each node: in some second-order faces the corner force of a
     uniform tension is zero or negative. For such units compute ``jump`` with the normal held, so
     that shear alone is released.
@@ -96,7 +96,7 @@ def energy_release_rates(
     r"""Energy release rates by mode at front nodes, with their sign.
 
     The length that turns F w/2 into a rate on an uneven mesh, "tributary": near the front the
-    traction goes as K/sqrt(r) and the opening as K sqrt(r). A nodal force that collects the
+    traction varies as K/sqrt(r) and the opening as K sqrt(r). A nodal force that collects the
     traction of a length l is therefore proportional to K sqrt(l), an opening at distance l to K
     sqrt(l), and
 
@@ -105,8 +105,8 @@ def energy_release_rates(
     with the factor fixed by even spacing, where F w = 2 G b d. First order: the force at the front
     node collects from both elements at it, l_F = (d_ahead + d_behind)/2; l_w = d_behind. Second
     order: the same for the corner force with the opening of the wake corner. The midside force
-    collects from the element ahead alone, so l_F goes as d_ahead; the wake midside lies at
-    d_behind/2, so l_w goes as d_behind:
+    collects from the element ahead alone, so l_F is proportional to d_ahead; the wake midside lies
+    at d_behind/2, so l_w is proportional to d_behind:
 
         G = F_corner w_corner/(2 b sqrt((d_ahead + d_behind)/2 d_behind))
           + F_midside w_midside/(2 b sqrt(d_ahead d_behind))
@@ -159,6 +159,13 @@ def closure_weights(
 ) -> Array:
     """What :func:`energy_release_rates` multiplies the products F w with.
 
+    Args:
+        ahead: Length of the element ahead, shape (n,) [length].
+        behind: Length of the element behind, shape (n,) [length].
+        width: Width of the front that belongs to the node, shape (n,) [length].
+        n_products: Products F w per node: 1, or 2 for second order.
+        normalisation: As for :func:`energy_release_rates`.
+
     Returns:
         Shape (n, n_products) [1/length^2].
 
@@ -186,7 +193,16 @@ def closure_weights(
 
 
 def weighted_rates(force: Array, opening: Array, weights: Array) -> Array:
-    """:func:`energy_release_rates` with weights at hand."""
+    """:func:`energy_release_rates` with given weights.
+
+    Args:
+        force: Bond forces, tension positive, shape (n, k, 3) [force].
+        opening: Jumps of displacement behind, shape (n, k, 3) [length].
+        weights: From :func:`closure_weights`, shape (n, k) [1/length^2].
+
+    Returns:
+        G_I, G_II, G_III, shape (n, 3) [force/length].
+    """
     products = force * opening
     # closed wake nodes do not count for mode I
     products[..., 0] = np.where(opening[..., 0] > 0.0, products[..., 0], 0.0)

@@ -109,8 +109,11 @@ class CrackLengthVsTime(Criterion):
 
         Args:
             time: Total time [time].
-            tip: As for :meth:`fraction`.
-            d_behind: Likewise.
+            tip: Length l_3 of each tip node, shape (n,) [length].
+            d_behind: Distance d_23 from the node behind, shape (n,) [length].
+
+        Returns:
+            Values, shape (n,).
         """
         length = self.length(time)
         begun = length > -np.inf
@@ -210,9 +213,10 @@ class LengthEvaluator(Evaluator):
         return self._origins
 
     def measure(self, tips: Tips, state: State, time: float) -> Array:
-        """Length of the curve, 1 once it has begun, way of the origins from the reference point.
+        """Length of the curve, 1 once it has begun, and displacement of the origins; shape (n, 5).
 
-        Shape (n, 5); the way is that of their displacements alone.
+        The columns are the length [length], the number 1 or 0, and the three components of the
+        displacement relative to the reference point [length].
         """
         begin = self.criterion.times[0]
         if abs(time - begin) <= _SAME_TIME * abs(begin):
@@ -229,7 +233,15 @@ class LengthEvaluator(Evaluator):
         return out
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
-        """F, and the crack length from the reference point to the tip."""
+        """Values f, and the crack length from the reference point to the tip.
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, shape (n, 5).
+
+        Returns:
+            f, shape (n,), and "length", shape (n,) [length].
+        """
         way = self._begin[tips.node] - self.reference + measured[:, 2:]
         length = np.linalg.norm(way, axis=1) + self._grown[tips.node]
         f = self.criterion.fraction(measured[:, 0], length, tips.d_behind)

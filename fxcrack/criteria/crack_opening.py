@@ -206,12 +206,20 @@ class OpeningEvaluator(_AtDistance):
         return np.stack([stencil(opening), self._grown[tips.node]], axis=1)
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
-        """F, the opening cod and the length the tip has grown."""
+        """Values f, the opening and the length the tip has grown.
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, shape (n, 2) [length].
+
+        Returns:
+            f, shape (n,), and "cod" and "grown", each of shape (n,) [length].
+        """
         opening, grown = measured.T
         f = self.criterion.value(opening, grown, self.temperature_at(tips))
         return f, {"cod": opening, "grown": grown}
 
     def needs(self, tips: Tips) -> Ints:
-        """The open nodes whose openings are used."""
+        """The open slave nodes whose openings are used, shape (m,)."""
         nodes = self.stencil(tips).nodes.ravel()
         return np.asarray(nodes[~self.front.bonded[nodes]])

@@ -1,4 +1,4 @@
-"""What every criterion says of itself; the analysis asks this and never which class it is.
+"""Properties every criterion defines; the analysis uses these and never the class of it.
 
 A new criterion, one of the package's or a user's own, is a class derived from :class:`Criterion`,
 usually a frozen dataclass of its material constants. It must give :meth:`Criterion.evaluator`;
@@ -38,7 +38,7 @@ class Criterion(Protocol):
         Args:
             probe: The interface, with its front in the initial state.
             temperature: Temperature of its slave nodes; None where the debond gives none, and that
-                of the bodies is not asked for (:attr:`needs_temperature`) or does not exist.
+                of the bodies is not needed (:attr:`needs_temperature`) or does not exist.
             softens: Whether bonds are released softening with their opening.
 
         Raises:
@@ -116,7 +116,7 @@ class Criterion(Protocol):
 
     @property
     def knows_toughness(self) -> bool:
-        """Whether the energy that a released bond spends is known.
+        """Whether the energy that a released bond dissipates is known.
 
         Then bonds may soften with their opening, and the evaluator is a
         :class:`~fxcrack.criteria.evaluator.SofteningEvaluator`.
@@ -131,7 +131,7 @@ class Criterion(Protocol):
 
     @property
     def softens(self) -> bool:
-        """Whether bonds soften with their opening whatever the release law says."""
+        """Whether bonds soften with their opening whatever the release law is."""
         return False
 
     @property
@@ -146,7 +146,7 @@ class Criterion(Protocol):
             normal_only: Whether the bond holds in the normal direction only.
 
         Raises:
-            InputError: They do not go together.
+            InputError: They are not compatible.
         """
         if normal_only and not self.allows_normal_only:
             raise InputError(

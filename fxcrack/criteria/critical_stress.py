@@ -161,7 +161,7 @@ class StressEvaluator(_AtDistance):
         return _on_face(way, way.s[:, None], min(self.distance, reach), self.surface.order)
 
     def measure(self, tips: Tips, state: State, time: float) -> Array:
-        """Traction in the tip frame (normal, growth direction, front), shape (n, 3)."""
+        """Traction in the tip frame (normal, growth direction, front), shape (n, 3) [stress]."""
         stencil = self.stencil(tips)
         traction = self.probe.bond_forces(stencil.nodes, state)
         traction = stencil(traction / self.surface.areas[stencil.nodes][..., None])
@@ -171,11 +171,19 @@ class StressEvaluator(_AtDistance):
         return out
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
-        """F and the stresses s11 (normal), s12 (growth direction) and in 3-D s13 (front)."""
+        """Values f and the stresses s11 (normal), s12 (growth direction) and in 3-D s13 (front).
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, shape (n, 3) [stress].
+
+        Returns:
+            f, shape (n,), and the stresses, each of shape (n,) [stress].
+        """
         names = ("s11", "s12", "s13")[: self.probe.gdim]
         f = self.criterion.value(measured, self.temperature_at(tips))
         return f, dict(zip(names, measured.T, strict=False))
 
     def needs(self, tips: Tips) -> Ints:
-        """The nodes whose forces are used."""
+        """The slave nodes whose forces are used, shape (m,)."""
         return np.asarray(self.stencil(tips).nodes.ravel())

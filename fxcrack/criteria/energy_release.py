@@ -194,12 +194,12 @@ class RateCriterion(Criterion):
         *,
         n_slave: int,
     ) -> Array | None:
-        """Toughness by mode that a bond spends once released, shape (n, 3) [force/length].
+        """Toughness by mode that a bond dissipates once released, shape (n, 3) [force/length].
 
         Arguments and errors as for :meth:`toughness_at`.
 
         Returns:
-            None where the toughness of onset is spent.
+            None where it is the toughness of onset.
         """
         return None
 
@@ -250,8 +250,8 @@ class RateEvaluator(SofteningEvaluator):
         surface = probe.pair.surface
         criterion.check_slaves(surface.n_nodes)
         if softens and criterion.needs_exact_S and not criterion.softens:
-            # The energy of releasing the node is the one it is to spend: its bond softens as fast
-            # as the bodies give way.
+            # The energy of releasing the node is the one its bond is to dissipate: the bond softens
+            # as fast as the bodies unload.
             log.warn(
                 "interface '%s': a bond whose onset is found by method='closure' is neutral there "
                 "and runs open at once, as with StepRelease, though its release is to follow the "
@@ -271,7 +271,7 @@ class RateEvaluator(SofteningEvaluator):
         return None if self._moving else self.criterion.degree
 
     def measure(self, tips: Tips, state: State, time: float) -> Array:
-        """Tip forces and the openings they are multiplied with, shape (n, 6 k).
+        """Tip forces [force] and the openings they are multiplied with [length], shape (n, 6 k).
 
         A last column holds the temperature of the tips where it changes in time.
         """
@@ -290,7 +290,12 @@ class RateEvaluator(SofteningEvaluator):
         return np.concatenate(columns, 1)
 
     def rates(self, tips: Tips, measured: Array) -> Array:
-        """Energy release rates by mode, shape (n, 3), force/length."""
+        """Energy release rates by mode, shape (n, 3), force/length.
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, shape (n, 6 k), or (n, 6 k + 1) with temperature.
+        """
         half = measured.shape[1] // 2
         force, opening = (
             m.reshape(len(tips), -1, 3) for m in (measured[:, :half], measured[:, half : 2 * half])
@@ -305,7 +310,15 @@ class RateEvaluator(SofteningEvaluator):
         return weighted_rates(force, opening, self._weights)
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
-        """F and GI, GII, GIII."""
+        """Values f and the energy release rates.
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, shape (n, 6 k), or (n, 6 k + 1) with temperature.
+
+        Returns:
+            f, shape (n,), and "GI", "GII", "GIII", each of shape (n,) [force/length].
+        """
         rates = self.rates(tips, measured)
         toughness = self._toughness(tips, measured)
         report = dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
@@ -343,15 +356,15 @@ class RateEvaluator(SofteningEvaluator):
         """Nodes that soften by one law each, and the energy it dissipates until they are free.
 
         All nodes of a unit share a law: their forces, pressed ones included, fall in proportion,
-        and together they spend what the area of the unit asks for.
+        and together they dissipate the energy per area of the law times the area of the unit.
 
         Args:
             nodes: All nodes that are released now, shape (n,).
-            values: What the criterion says at the front they are part of.
+            values: Values of the criterion at the front they are part of.
             release: How they are released.
 
         Raises:
-            NotPositiveDefinite: A body would come free: without bound is what its last unit frees.
+            NotPositiveDefinite: A body would come free: its last unit frees unbounded energy.
         """
         surface = self.probe.front.surface
         tips, units = values.tips, self.units(values.tips)
@@ -373,8 +386,8 @@ class RateEvaluator(SofteningEvaluator):
             worst = units.leaders[np.argmax(critical)]
             raise NotPositiveDefinite(int(tips.node[worst]))
         out, left = [], np.unique(nodes)
-        # a corner row that two edges share goes with the one that is more critical; rows that are
-        # to go alone (fatigue) come last
+        # a corner row that two edges share belongs to the one that is more critical; rows that are
+        # released alone (fatigue) come last
         order = np.argsort(-values.f[units.leaders], kind="stable")
         groups = [(k, units.leaders[k], units.shares[k] > 0.0) for k in order]
         for i in np.setdiff1d(np.arange(len(tips)), units.leaders):
@@ -395,7 +408,7 @@ class RateEvaluator(SofteningEvaluator):
 
 _NO_MODE = 1e-11
 """Forces of a mode below this fraction of the largest are round-off. A mode so weak would have
-1e-22 of the rate of the others; alone, beside pressure, it would ask for loads without end."""
+1e-22 of the rate of the others; alone, beside pressure, it would require unbounded loads."""
 
 
 def _real(force: Array) -> Array:

@@ -1,4 +1,4 @@
-"""What a criterion says at the tips of one interface.
+"""Values of a criterion at the tips of one interface.
 
 An evaluator measures quantities at the tips that are linear between two equilibria of the same
 states (bond forces, openings, tractions, time), and turns them into f and what the history
@@ -24,7 +24,7 @@ from fxcrack.interface.tips import FrontUnits, Tips
 
 @dataclass(frozen=True)
 class TipValues:
-    """What the criterion says at the tips of one interface.
+    """Values of the criterion at the tips of one interface.
 
     Attributes:
         tips: Front nodes.
@@ -55,7 +55,7 @@ class Evaluator(Protocol):
         behind: Distance behind a tip whose openings are needed, length.
         ends: Time after which nothing grows any more.
         toughness: Toughness by mode of the slave nodes when the analysis begins, shape (n_nodes, 3)
-            [force/length], so that a restart knows another one; None without.
+            [force/length], so that a restart detects a change; None without.
     """
 
     ahead: float = 0.0
@@ -73,7 +73,15 @@ class Evaluator(Protocol):
         ...
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
-        """F and report from measured quantities, shape (n_tips, m)."""
+        """Values f and report.
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, or linear between such values, shape (n_tips, m).
+
+        Returns:
+            f, shape (n_tips,), and quantities behind it by name, each of shape (n_tips,).
+        """
         ...
 
     def needs(self, tips: Tips) -> Ints:
@@ -86,7 +94,7 @@ class Evaluator(Protocol):
 
 
 class SofteningEvaluator(Evaluator, Protocol):
-    """An evaluator that knows the energy which released bonds spend."""
+    """An evaluator that knows the energy which released bonds dissipate."""
 
     def units(self, tips: Tips) -> FrontUnits:
         """Tips that are released together, by one law."""
@@ -97,7 +105,7 @@ class SofteningEvaluator(Evaluator, Protocol):
 
         Args:
             nodes: All nodes that are released now, shape (n,).
-            values: What the criterion says at the front they are part of.
+            values: Values of the criterion at the front they are part of.
             release: How they are released.
         """
         ...
@@ -218,12 +226,16 @@ class TipEvaluator(Evaluator):
         return self._degree
 
     def measure(self, tips: Tips, state: State, time: float) -> Array:
-        """Forces and openings, shape (n, 6 k)."""
+        """Forces [force] and openings [length] in the tip frames, shape (n, 6 k)."""
         both = bond_forces(self.probe, tips, state), openings(self.probe, tips, state)
         return np.concatenate([x.reshape(len(tips), -1) for x in both], axis=1)
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
-        """F and report of the function.
+        """Values f and report of the function, each of shape (n,).
+
+        Args:
+            tips: Front nodes.
+            measured: From :meth:`measure`, shape (n, 6 k).
 
         Raises:
             InputError: f has another shape than (n,), or is NaN.

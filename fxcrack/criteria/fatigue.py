@@ -39,7 +39,7 @@ class Regime(IntEnum):
 
 @dataclass(frozen=True)
 class Paris:
-    """Constants of onset and growth. Their units go with those of G: [G]^-c2 and length [G]^-c4.
+    """Constants of onset and growth. Their units follow from that of G: [G]^-c2 and length [G]^-c4.
 
     Attributes:
         c1: Factor of onset [cycles]; 0: growth starts at once.
@@ -175,12 +175,13 @@ def cycle_jump(
 ) -> CycleJump:
     """Jump over the cycles to the next release.
 
-    With N0 counted once, until onset, a node in the Paris regime goes after
+    With N0 counted once, until onset, a node in the Paris regime is released after
 
         dN = max(N0 - N, 0) + (da - credit)/(c3 dG^c4)
 
-    The jump is the smallest dN; nodes within ``tolerance`` of it go together. While a node is
-    beyond the upper limit the jump is one cycle: those nodes go, and others that finish within it.
+    The jump is the smallest dN; nodes within ``tolerance`` of it are released together. While a
+    node is beyond the upper limit the jump is one cycle: those nodes are released, and others that
+    finish within it.
 
     Args:
         paris: Constants of onset and growth.

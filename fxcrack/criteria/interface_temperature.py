@@ -60,7 +60,7 @@ def steady(
     Args:
         temperature: That of the interface.
         probe: The interface.
-        criterion: Who asks.
+        criterion: The criterion that needs it.
 
     Raises:
         InputError: It changes in time.

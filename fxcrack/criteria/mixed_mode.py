@@ -247,7 +247,7 @@ class FunctionLaw(MixedMode):
         g = clip(rates)
         tough = np.broadcast_to(np.asarray(toughness, dtype=np.float64), g.shape)
         some = g.max(axis=-1) > 0.0
-        # a mode mix is not defined where nothing is released: the function is not asked there
+        # a mode mix is not defined where nothing is released: the function is not called there
         given = np.where(some[..., None], g, tough).reshape(-1, 3)
         arguments = (*given.T, *tough.reshape(-1, 3).T)[: self._n]
         f = np.asarray(self.function(*arguments), dtype=np.float64)
@@ -310,6 +310,11 @@ _DOUBLINGS = 200
 
 def law_of(owner: str, mix: MixedMode | Callable[..., npt.ArrayLike]) -> MixedMode:
     """A law from what a user gave as ``mix``: a law, or a function (:class:`FunctionLaw`).
+
+    Args:
+        owner: Name of the criterion, for messages.
+        mix: A law, or f as a function of arrays of shape (n,) [force/length], see
+            :class:`FunctionLaw`.
 
     Raises:
         InputError: It is neither.

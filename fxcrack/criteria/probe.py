@@ -18,7 +18,7 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.interface.tips import Tips
 
 State = Any
-"""A state of the solver, e.g. an equilibrium; criteria hand it on to the probe and read nothing."""
+"""A state of the solver, e.g. an equilibrium; criteria pass it to the probe and read nothing."""
 
 
 class FrontProbe(Protocol):
@@ -130,11 +130,11 @@ def bond_forces(probe: FrontProbe, tips: Tips, state: State) -> Array:
 
 
 def _loads_to_come(probe: FrontProbe, tips: Tips, state: State) -> Array:
-    """Load on the faces the crack is about to open, if that of the wake goes on there.
+    """Load on the faces the crack is about to open, if that of the wake continues there.
 
     A pressure p on the faces leaves the bond forces short by p times the part of the tip's
     tributary area that is still bonded (as superposing the uniform stress -p shows); without
-    this the error of G goes with the square root of the element size only.
+    this the error of G falls with the square root of the element size only.
 
     Returns:
         Global vectors per force node, shape (n, k, 3).

@@ -1,9 +1,9 @@
 """How the bond force goes to zero after a node has debonded.
 
 A law gives the fraction phi of the bond force F0 at debonding that remains, F = phi F0. What
-drives it is told by ``driver``:
+drives it is given by ``driver``:
 
-    "once"        nothing: all of it goes             StepRelease
+    "once"        nothing: all of it is removed       StepRelease
     "increments"  increments since debonding          RampRelease(increments=...)
     "time"        time since debonding                AmplitudeRelease
     "opening"     largest opening over final one      RampRelease, ProgressiveRelease
@@ -56,8 +56,9 @@ class ReleaseLaw(Protocol):
     def driver(self) -> Driver:
         """What the force falls with; this decides how a release begins.
 
-        "once": it goes in the increment that follows debonding. "increments", "time": it follows
-        :meth:`remaining`. "opening": it falls linearly until the energy :meth:`spent` is spent.
+        "once": it is removed in the increment after debonding. "increments", "time": it follows
+        :meth:`remaining`. "opening": it falls linearly until the energy :meth:`spent` is
+        dissipated.
         """
         ...
 
@@ -79,7 +80,7 @@ class ReleaseLaw(Protocol):
         return float("inf")
 
     def spent(self, rate: Array, critical: Array) -> Array:
-        """Energy per area that bonds spend whose force falls with opening, shape (n,).
+        """Energy per area dissipated by bonds whose force falls with opening, shape (n,).
 
         Args:
             rate: Total energy release rate at debonding, shape (n,) [force/length].
@@ -96,7 +97,7 @@ def _linear(largest: npt.ArrayLike, final: float) -> Array:
 
 @dataclass(frozen=True)
 class StepRelease(ReleaseLaw):
-    """The whole force goes in the increment that follows debonding."""
+    """The whole force is removed in the increment that follows debonding."""
 
     driver: ClassVar[Driver] = "once"
 
@@ -107,10 +108,10 @@ class StepRelease(ReleaseLaw):
 
 @dataclass(frozen=True)
 class RampRelease(ReleaseLaw):
-    """The force goes linearly, with opening or over a number of increments.
+    """The force falls linearly, with opening or over a number of increments.
 
     With opening it ends at the opening the wake node had when the front node debonded, so that on
-    even spacing about the toughness is spent.
+    even spacing about the toughness is dissipated.
 
     Attributes:
         increments: Number of increments after which nothing remains; None: with opening.
@@ -151,10 +152,10 @@ class RampRelease(ReleaseLaw):
 
 @dataclass(frozen=True)
 class ProgressiveRelease(ReleaseLaw):
-    """The force falls linearly with opening so that exactly the toughness is spent.
+    """The force falls linearly with opening so that exactly the toughness is dissipated.
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
-    the mesh. The opening never heals; the force ends at w_f = 2 G_c A/|F0|.
+    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A/|F0|.
     """
 
     driver: ClassVar[Driver] = "opening"

@@ -39,8 +39,8 @@ class VCCT(RateCriterion):
         tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
         method: "vcct", or "closure": the exact energy of releasing the node.
         normalisation: Length VCCT divides by, see :func:`energy_release_rates`.
-        unstable_tolerance: f_tol of unstable growth: several nodes may go at one load while
-            1 + tolerance <= f <= 1 + unstable_tolerance. None: off; math.inf: unlimited.
+        unstable_tolerance: f_tol of unstable growth: several nodes may debond at one load
+            while 1 + tolerance <= f <= 1 + unstable_tolerance. None: off; math.inf: unlimited.
         viscosity: Viscous regularisation mu of released nodes, also of those that soften [time];
             0: none.
     """
@@ -112,7 +112,7 @@ class EnhancedVCCT(VCCT):
     ) -> Array:
         """Toughness of propagation by mode, shape (n, 3) [force/length].
 
-        Arguments and errors as for :meth:`toughness_at`. The energy to spend is
+        Arguments and errors as for :meth:`toughness_at`. The energy to dissipate is
         ``critical(rates, propagation)`` with the rates of onset.
         """
         return self._columns(

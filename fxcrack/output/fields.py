@@ -49,7 +49,7 @@ def stress_function(source: Analysis | HasAnalysis, u: fem.Function, time: float
     Args:
         source: A scene or its analysis, after a step.
         u: Its displacement.
-        time: Its time, which tells the temperature.
+        time: Its time, which determines the temperature.
     """
     analysis = analysis_of(source)
     if isinstance(analysis.solver, NewtonSolver):

@@ -43,7 +43,7 @@ class InterfaceFields:
         front: 1 on front nodes, shape (n_nodes,).
         release_time: Time at which a node was released, 0 if it was open from the start, NaN while
             it is bonded, shape (n_nodes,).
-        at_front: What the criterion says at the front nodes, 0 elsewhere, each of shape (n_nodes,):
+        at_front: Values of the criterion at the front nodes, 0 elsewhere, each of shape (n_nodes,):
             f, and what is behind it, as GI, GII, GIII and their sum G (force/length).
         bonds: The bonds under the usual output names, see
             :func:`~fxcrack.steps.bond_records.bond_state`; empty where no criterion is given.
@@ -63,8 +63,12 @@ class InterfaceFields:
 def residual(analysis: Analysis, u: fem.Function) -> Array:
     """Forces of interfaces and supports on the bodies, K u - f; collective.
 
+    Args:
+        analysis: The analysis.
+        u: Displacement, n_local owned dofs on this rank, length.
+
     Returns:
-        Shape (n_local,), the owned dofs of this rank, force.
+        Array of shape (n_local,), the owned dofs of this rank, force.
     """
     vector = analysis.solver.nodal_forces(u.x.petsc_vec)
     values = np.array(vector.array)

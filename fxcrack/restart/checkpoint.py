@@ -131,7 +131,7 @@ class _Folder:
 
     Attributes:
         folder: Where.
-        restart: Whether scenes go on from what is there.
+        restart: Whether scenes continue from what is there.
         seconds: As in :class:`Checkpoint`.
         count: Number of scenes so far.
     """
@@ -155,8 +155,8 @@ def checkpoints(
     so on. A scene that is run with a checkpoint of its own follows that.
 
     Args:
-        folder: Where the files go.
-        restart: Go on from the files that are there.
+        folder: Where the files are written.
+        restart: Continue from the files that are there.
         seconds: Time between two checkpoints.
     """
     token = _folder.set(_Folder(Path(folder), restart, seconds))

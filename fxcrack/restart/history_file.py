@@ -47,7 +47,7 @@ class HistoryFile:
             last: Nothing follows: write all of them, and bring them to the disk.
 
         Returns:
-            What went wrong, ``None`` if nothing. The rows that were there stay readable.
+            What failed, ``None`` if nothing. The rows that were there stay readable.
         """
         if self._history.comm.rank > 0:
             return None

@@ -36,12 +36,12 @@ class RestartManager:
         files: What the steps of the scene share.
         step: The step.
         grow: Which debonds may grow.
-        checkpoint: Where the state goes, if anywhere.
-        restart: Go on from the checkpoint, if there is one.
-        save: Where the history goes while the step runs, if anywhere.
+        checkpoint: Where the state is written, if anywhere.
+        restart: Continue from the checkpoint, if there is one.
+        save: Where the history is written while the step runs, if anywhere.
 
     Attributes:
-        progress: Progress of the step to go on from, ``None`` if it begins.
+        progress: Progress of the step to continue from, ``None`` if it begins.
         finished: Why the step ended, if the checkpoint is that of its end; else empty.
 
     Raises:
@@ -112,7 +112,7 @@ class RestartManager:
 
     @property
     def resumes(self) -> bool:
-        """Whether the step goes on from a checkpoint."""
+        """Whether the step continues from a checkpoint."""
         return self.progress is not None
 
     def put_in_equilibrium(self) -> None:
@@ -140,7 +140,7 @@ class RestartManager:
         """Save what is due, stop if a signal came; collective.
 
         Args:
-            progress: What the step needs to go on from here, plain values.
+            progress: What the step needs to continue from here, plain values.
 
         Raises:
             Interrupted: A signal came on some rank.
@@ -189,7 +189,7 @@ class RestartManager:
         self._last = time.monotonic()
 
     def _save_all(self, progress: dict[str, Any]) -> str:
-        """Save everything; says what and where."""
+        """Save everything and report what and where."""
         kept = []
         if self._file is not None:
             raise_on_all_ranks(self._comm, self._file.update(last=True), FxcrackError)
@@ -206,7 +206,7 @@ class RunFiles:
 
     Attributes:
         steps: Number of steps begun.
-        run_id: Tells this run from others that write to the same files.
+        run_id: Distinguishes this run from others that write to the same files.
         default: Checkpoint, history file and restart for all steps, if there are such.
     """
 

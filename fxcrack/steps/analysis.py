@@ -41,7 +41,7 @@ class EnergyBalance:
         external_work: Work of supports and force patterns, force times length.
         released: Energy that left through bonds; cohesive bonds give some of it back as they close.
         by_force: The part of it that left through all other bonds.
-        viscous: The part of that which viscosity took.
+        viscous: The part of that which viscosity dissipated.
     """
 
     time: float = 0.0
@@ -66,8 +66,8 @@ class Snapshot:
 
     Attributes:
         balance: Time, increments and energies.
-        tip_values: What the criteria said at the tips.
-        solver: State of interfaces and bodies, and the energy that friction had taken.
+        tip_values: Values of the criteria at the tips.
+        solver: State of interfaces and bodies, and the energy that friction had dissipated.
     """
 
     balance: EnergyBalance
@@ -89,7 +89,7 @@ class Analysis:
         balance: Time, increments and energies.
         cracks: One per debond, once a step was run.
         active: Those of them that may grow in the present step.
-        tip_values: What their criteria say at the present tips, in the order of :attr:`active`.
+        tip_values: Values of their criteria at the present tips, in the order of :attr:`active`.
         ramps: Bonds whose force is released with time or over increments.
         fatigue: What cycles leave behind for later ones.
         started: Whether there is an equilibrium yet.
@@ -166,7 +166,7 @@ class Analysis:
         """Force components on the slave nodes of a pair that the state prescribes.
 
         Returns:
-            Shape (n_nodes, gdim), force; zero where a component is not retained.
+            Array of shape (n_nodes, gdim), force; zero where a component is not retained.
         """
         return np.append(self.solver.state.force, 0.0)[self.solver.index[p]]
 
@@ -190,7 +190,7 @@ class Analysis:
         return given_forces(self.solver, self.ramps, time, self.balance.increment)
 
     def add_ramp(self, ramp: ForceRamp) -> None:
-        """Prescribe the forces of further bonds; ramps that have ended go."""
+        """Prescribe the forces of further bonds; ramps that have ended are removed."""
         still = still_pulling(self.ramps, self.time, self.balance.increment)
         self.ramps = [*still, ramp]
 
@@ -227,7 +227,7 @@ class Analysis:
         ]
 
     def evaluate(self, state: Equilibrium, time: float) -> list[TipValues]:
-        """What the criteria say in a state with the present bonds, one entry per active crack."""
+        """Values of the criteria in a state with the present bonds, one entry per active crack."""
         # normals and lengths at a front follow bodies that move far: their tips are made anew
         return [
             g.evaluate(v.tips if self.linear else g.tips(), state, time) for g, v in self.at_tips()
@@ -238,10 +238,10 @@ class Analysis:
         self.tip_values = self.evaluate(self.solver.state, self.time)
 
     def at_tips(self) -> list[tuple[Crack, TipValues]]:
-        """Active cracks with what their criteria say."""
+        """Active cracks with the values of their criteria."""
         return list(zip(self.active, self.tip_values, strict=True))
 
-    # -- forth and back ------------------------------------------------------------------
+    # -- advance and rollback ------------------------------------------------------------
 
     def advance(self, point: Equilibrium, time: float) -> None:
         """Make the end of a piece the present state and account for the energy of the piece.

@@ -108,7 +108,7 @@ def bond_state(
     Args:
         growth: The interface.
         ramps: Bonds that are released with time or over increments.
-        values: What the criterion says at the present front; None where it is not active.
+        values: Values of the criterion at the present front; None where it is not active.
 
     Returns:
         BDSTAT: 1 bonded, 0 open, between them the remaining fraction; DBSF: remaining fraction of

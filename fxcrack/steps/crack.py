@@ -28,7 +28,7 @@ _TIE = 1e-6
 """Front nodes whose f lies within this fraction of the largest one are released together."""
 
 _OVERLAP = 1e-2
-"""Faces that overlap by less than this fraction of how they move on each other are not told of."""
+"""Overlaps below this fraction of the relative motion of the faces are not reported."""
 
 
 class Crack:
@@ -40,7 +40,7 @@ class Crack:
         debond: Interface and criterion.
 
     Attributes:
-        probe: What the criterion asks of the interface.
+        probe: The interface as the criterion sees it.
         n_released: Nodes released so far.
         records: What is known of every release, in order.
         paths: Where tips come from.
@@ -146,7 +146,7 @@ class Crack:
         return first_crossing(self.evaluator, values.tips, ends, upward=upward, known=values)
 
     def ready(self, values: TipValues, level: float = 1.0) -> Ints:
-        """Positions of the tips to release: the critical one and those tied with it."""
+        """Positions of the tips to release, the critical one and those tied with it, shape (m,)."""
         if not len(values.f) or values.f.max() < level * (1.0 - 1e-9):
             return np.zeros(0, dtype=np.int64)
         return np.flatnonzero(values.f >= values.f.max() * (1.0 - _TIE))
@@ -165,8 +165,11 @@ class Crack:
         """Nodes to release where some tips are chosen: where bonds soften, by whole units.
 
         Args:
-            values: What the criterion says at the front.
-            chosen: Positions of tips.
+            values: Values of the criterion at the front.
+            chosen: Positions of tips, shape (m,).
+
+        Returns:
+            Slave nodes, sorted, shape (n,).
         """
         tips = values.tips
         if self.opening_driven:
@@ -179,6 +182,10 @@ class Crack:
 
         Progressive release: the critical rate at the present mode mix times the area; enhanced
         VCCT: that of propagation; ramp: half the force times the wake opening at onset.
+
+        Args:
+            nodes: Slave nodes that are released now, shape (n,).
+            values: Values of the criterion at the front they are part of.
         """
         return self._softening.to_soften(nodes, values, self.debond.release)
 
@@ -188,7 +195,7 @@ class Crack:
         return cast(SofteningEvaluator, self.evaluator)
 
     def record(self, nodes: Ints, values: TipValues, state: Equilibrium, time: float) -> None:
-        """Note nodes that are about to be released."""
+        """Record slave nodes that are about to be released, shape (n,)."""
         self.n_released += len(nodes)
         self.records += release_records(self, nodes, values, state, time)
 

@@ -41,8 +41,8 @@ class FatigueState:
         waiting: Per pair, slave nodes at which onset is still to come, shape (n_nodes,).
         credit: Per pair, growth within the element of each slave node, shape (n_nodes,), length.
         table: One entry per tip and stabilised cycle in each column: N and the crack length at
-            its beginning (of the tip in 2-D, the mean of the front in 3-D), what the cycle says
-            there, and whether the tip was released at its end.
+            its beginning (of the tip in 2-D, the mean of the front in 3-D), the values of
+            :class:`TipCycle` there, and whether the tip was released at its end.
     """
 
     N: float = 0.0
@@ -53,7 +53,13 @@ class FatigueState:
     )
 
     def meet(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
-        """Take notice of a front; the nodes of the first one on a pair wait for onset."""
+        """Register a front; the nodes of the first one on a pair wait for onset.
+
+        Args:
+            p: Number of the pair.
+            front: Slave nodes at the front, shape (n,).
+            n_nodes: Number of slave nodes of the pair.
+        """
         if p not in self.waiting:
             self.waiting[p] = np.zeros(n_nodes, dtype=np.bool_)
             self.waiting[p][front] = True
@@ -68,7 +74,16 @@ class FatigueState:
         cycle: TipCycle,
         released: Bools,
     ) -> None:
-        """Add one entry per tip of an interface to every column of the table."""
+        """Add one entry per tip of an interface to every column of the table.
+
+        Args:
+            N: Cycles at the beginning of the cycle.
+            interface: Title of the interface.
+            nodes: Slave nodes at the front, shape (n,).
+            lengths: Crack length of each tip, shape (n,), length.
+            cycle: The stabilised cycle at the tips.
+            released: Whether each tip is released at its end, shape (n,).
+        """
         n = len(nodes)
         rates = [getattr(cycle, name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
         columns = [[N] * n, [interface] * n, nodes.tolist(), lengths, *rates, released.tolist()]

@@ -28,10 +28,10 @@ class Cycles:
 
     ==================== =======================================================================
     maximum, minimum     times of the amplitudes (with the default ramp: load factors) of the two
-                         extremes; the loads go straight from one to the other and back
+                         extremes; the loads vary linearly from one to the other and back
     maximum, ratio       the same, with all loads of the maximum times R at the minimum
     period               first and last time of one turn through the amplitudes, for loads that are
-                         not in step with each other; they must return to where they began
+                         not in phase with each other; they must return to where they began
     ==================== =======================================================================
 
     G_max and G_min are the extremes of the total rate on this way, for each tip its own. On a
@@ -150,7 +150,7 @@ def check_criteria(step: Static | Cycles, debonds: Sequence[Debond]) -> None:
         debonds: Those that are to grow in it.
 
     Raises:
-        InputError: A criterion and the step do not go together.
+        InputError: A criterion and the step are not compatible.
     """
     for debond in debonds:
         who = f"interface '{debond.interface.title}'"

@@ -32,7 +32,7 @@ CheckpointPoint = Callable[[dict[str, Any]], None]
 """Called between two increments or releases with the progress of the step, plain values."""
 
 BEYOND = 1e30
-"""A step without an end time that loads beyond this time would go on for ever."""
+"""A step without an end time that loads beyond this time would never end."""
 
 LARGE = 1e60
 """A time that is never reached: the step has no end time."""
@@ -47,7 +47,7 @@ class StepDriver:
         observer: Called with every row.
         checkpoint_point: Called where the step could be resumed from the state of the analysis and
             the progress it is given.
-        resume: Progress of an earlier run of the step from which to go on.
+        resume: Progress of an earlier run of the step from which to continue.
         columns: Further columns of every row.
 
     Attributes:
@@ -57,7 +57,7 @@ class StepDriver:
         end_time: Time at which the step ends; :data:`LARGE` if it has none.
 
     Raises:
-        InputError: The bodies do not go with the stepping.
+        InputError: The bodies and the stepping are not compatible.
     """
 
     def __init__(
@@ -120,12 +120,12 @@ class StepDriver:
             analysis.evaluate_tips()
 
     def checkpoint_point(self, **progress: Any) -> None:
-        """Say that nothing is half done; with what the stepping needs to go on from here."""
+        """Mark a consistent state; ``progress`` is what the stepping needs to continue from it."""
         if self._checkpoint_point is not None:
             self._checkpoint_point(progress)
 
     def ended(self) -> str:
-        """Why the step ends in the present state; empty if it goes on."""
+        """Why the step ends in the present state; empty if it continues."""
         analysis = self.analysis
         for end in self.step.ends:
             if isinstance(end, Time) and analysis.time >= end.time * (1.0 - 1e-14):

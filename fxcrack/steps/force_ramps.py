@@ -22,7 +22,7 @@ class PrescribedRamp:
     Attributes:
         p: Number of the pair.
         nodes: Slave nodes, shape (n,).
-        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim), force.
         law: The amplitude, or the number of increments.
         start: Time of debonding, or number of the increment.
     """
@@ -37,7 +37,7 @@ class PrescribedRamp:
     def begin(
         cls, solver: Solver, p: int, nodes: Ints, law: ReleaseLaw, time: float
     ) -> PrescribedRamp:
-        """Note the bond forces of nodes that are about to be released."""
+        """Record the bond forces of slave nodes, shape (n,), that are about to be released."""
         return cls(p, nodes, bond_forces_of(solver, p, nodes), law, time)
 
     @property
@@ -62,7 +62,7 @@ class PrescribedRamp:
         """Nothing: the fraction depends on what has passed since debonding alone."""
 
     def viscous_part(self, spent: float, solver: Solver, here: Array, there: Array) -> float:
-        """Part of the energy spent between two states that viscosity took: none."""
+        """Viscous part of the energy between two states (jumps, shape (n_retained,)): none."""
         return 0.0
 
     def now(self, time: float, increment: int) -> float:
@@ -80,7 +80,7 @@ class ViscousRamp:
     Attributes:
         p: Number of the pair.
         nodes: Slave nodes, shape (n,).
-        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim), force.
         viscosity: mu, time.
         time: Time of the last accepted increment.
         remaining: Fraction 1 - D_v then.
@@ -102,11 +102,11 @@ class ViscousRamp:
         return self.remaining * self.viscosity / (self.viscosity + max(now - self.time, 0.0))
 
     def viscous_part(self, spent: float, solver: Solver, here: Array, there: Array) -> float:
-        """Part of the energy spent between two states that viscosity took: all of it."""
+        """Viscous part of the energy between two states (jumps, shape (n_retained,)): all of it."""
         return spent
 
     def accept(self, time: float, solver: Solver) -> None:
-        """Go on from the end of an accepted increment."""
+        """Continue from the end of an accepted increment."""
         self.remaining, self.time = self.fraction(time), time
 
     def breaks(self) -> tuple[float, ...]:
@@ -130,7 +130,7 @@ class ViscousCohesiveRamp:
         p: Number of the pair.
         nodes: Slave nodes, shape (n,).
         unit: Number of the law of each of them, shape (n,).
-        force: Force on the slave side at debonding in jump components, shape (n, gdim).
+        force: Force on the slave side at debonding in jump components, shape (n, gdim), force.
         final: w_f per law, shape (n_laws,), length.
         viscosity: mu, time.
         time: Time of the last accepted increment.
@@ -186,7 +186,12 @@ class ViscousCohesiveRamp:
         return (dt * self.damage + self.viscosity * self.lagging) / (dt + self.viscosity)
 
     def damage_at(self, solver: Solver, jump: Array) -> Array:
-        """D of a state, shape (n_laws,): of the largest opening along the force at debonding."""
+        """D of a state, shape (n_laws,): of the largest opening along the force at debonding.
+
+        Args:
+            solver: The solver.
+            jump: Jumps of the state, shape (n_retained,), length.
+        """
         index = solver.index[self.p][self.nodes]
         at = np.where(index >= 0, jump[np.maximum(index, 0)], 0.0)
         work = np.bincount(self.unit, (self.force * at).sum(axis=1), len(self.final))
@@ -194,27 +199,32 @@ class ViscousCohesiveRamp:
         return np.asarray(np.maximum(self.damage, np.clip(opening / self.final, 0.0, 1.0)))
 
     def fracture_energy(self, solver: Solver, jump: Array) -> float:
-        """What the law without viscosity has spent up to a state, force times length."""
+        """Energy the law without viscosity has dissipated up to a state, force times length.
+
+        Args:
+            solver: The solver.
+            jump: Jumps of the state, shape (n_retained,), length.
+        """
         left = 1.0 - self.damage_at(solver, jump)
         whole = 0.5 * _sizes(self.force, self.unit) * self.final
         return float(whole @ (1.0 - left**2))
 
     def viscous_part(self, spent: float, solver: Solver, here: Array, there: Array) -> float:
-        """Part of the energy spent between two states that viscosity took.
+        """Part of the energy dissipated between two states by viscosity, force times length.
 
-        It is what the law without viscosity would not have spent.
+        It is what the law without viscosity would not have dissipated.
 
         Args:
-            spent: Energy spent, force times length.
+            spent: Energy dissipated, force times length.
             solver: The solver.
-            here: Jumps of the first state, shape (n_retained,).
+            here: Jumps of the first state, shape (n_retained,), length.
             there: Jumps of the second state, likewise.
         """
         law = [self.fracture_energy(solver, jump) for jump in (here, there)]
         return spent - (law[1] - law[0])
 
     def accept(self, time: float, solver: Solver) -> None:
-        """Go on from the end of an accepted increment."""
+        """Continue from the end of an accepted increment."""
         self.lagging = self._lagging_at(time)
         self.damage, self.time = self.damage_at(solver, solver.state.jump), time
 
@@ -228,7 +238,7 @@ class ViscousCohesiveRamp:
 
 
 def _sizes(force: Array, unit: Ints) -> Array:
-    """Norms of the forces of each unit, never quite 0, shape (n_units,)."""
+    """Norms of the forces of each unit, never quite 0, shape (n_units,), force."""
     square = np.bincount(unit, (force**2).sum(axis=1))
     return np.maximum(np.sqrt(square), np.finfo(float).tiny)
 
@@ -246,7 +256,7 @@ def still_pulling(ramps: Sequence[ForceRamp], time: float, increment: int) -> li
 
 
 def bond_forces_of(solver: Solver, p: int, nodes: Ints) -> Array:
-    """Forces on the slave side of bonded nodes in jump components, shape (n, gdim).
+    """Forces on the slave side of bonded nodes in jump components, shape (n, gdim), force.
 
     With friction, less the part that contact carries at once.
     """
@@ -262,7 +272,7 @@ def bond_forces_of(solver: Solver, p: int, nodes: Ints) -> Array:
 
 
 def given_forces(solver: Solver, ramps: Sequence[ForceRamp], time: float, increment: int) -> Array:
-    """Forces that remain at a time and an increment, shape (n_retained,)."""
+    """Forces that remain at a time and an increment, shape (n_retained,), force."""
     force = np.zeros(solver.system.n_retained)
     for ramp in ramps:
         components = solver.index[ramp.p][ramp.nodes]

@@ -90,7 +90,7 @@ def step_by_increments(driver: StepDriver) -> str:
 
 
 def _release_ready(driver: StepDriver, control: IncrementControl) -> None:
-    """Release what is in its release range, again as long as more nodes may go at this load."""
+    """Release what is in its release range, again as long as more may be released at this load."""
     analysis = driver.analysis
     while _any_ready(analysis) and not driver.ended():
         release_critical(analysis, all_ready=True)
@@ -145,9 +145,9 @@ def _excess(cracks: Sequence[Crack], values: Sequence[TipValues], met: Sequence[
 def _met_at_start(analysis: Analysis) -> list[bool]:
     """Per crack, whether f is in its release range already at the start of an increment.
 
-    That goes for criteria other than energy release rates, right after nodes were released. The
-    smallest increment is used then, and the nodes go at its end whatever their f is: cutting back
-    could not make it smaller.
+    That applies to criteria other than energy release rates, right after nodes were released. The
+    smallest increment is used then, and the nodes are released at its end whatever their f is:
+    cutting back could not make it smaller.
     """
     return [
         g.criterion.smallest_increment_when_met
@@ -161,12 +161,12 @@ def _is_neutral(
 ) -> bool:
     """Whether the cutbacks left cannot keep f in its release range, and the smallest increment can.
 
-    So it is where growth is neutral: f stays what it was when a node goes, at the upper end of
-    its range at last. The next node then goes at the same load.
+    So it is where growth is neutral: f stays what it was when a node is released, at the upper
+    end of its range at last. The next node is then released at the same load.
 
     Args:
         analysis: The analysis at the start of an increment.
-        after: What the criteria said at its end, before it was undone.
+        after: Values of the criteria at its end, before it was undone.
         used: Its size, time.
         control: Size of the increments.
     """
@@ -185,7 +185,7 @@ def _is_neutral(
 
 
 def _may_run_on(analysis: Analysis) -> bool:
-    """Whether more nodes may go at this load: within the unstable growth tolerance."""
+    """Whether more nodes may be released at this load: within the unstable growth tolerance."""
     over = [
         (float(v.f.max(initial=0.0)), g.criterion.unstable_tolerance)
         for g, v in analysis.at_tips()

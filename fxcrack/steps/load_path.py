@@ -21,7 +21,7 @@ class LoadPath(Protocol):
     """Moves an analysis along the load of its step, at constant bonds; collective."""
 
     def to_crossing(self, target: float, *, upward: bool) -> bool:
-        """Go towards a time; stop where the largest f crosses 1.
+        """Advance towards a time; stop where the largest f crosses 1.
 
         Args:
             target: The time.
@@ -39,11 +39,11 @@ class LoadPath(Protocol):
             tolerance: What counts as zero where it cannot be met exactly.
 
         Returns:
-            Whether it fell to zero before the load was gone.
+            Whether it fell to zero before the load was zero.
         """
 
     def over_increment(self, target: float) -> None:
-        """Go to a time, whatever f becomes on the way; it may still be undone by a rollback."""
+        """Advance to a time, whatever f becomes on the way; this may be undone by a rollback."""
 
 
 def crossing(
@@ -58,7 +58,7 @@ def crossing(
 
     Args:
         analysis: The analysis.
-        values: What the criteria said before, one entry per active crack.
+        values: Values of the criteria before, one entry per active crack.
         ends: Equilibria at both ends of the piece.
         times: Their times.
         upward: Look for f rising to 1, or falling to it.

@@ -1,6 +1,6 @@
 """Moving along the load of nonlinear bodies: predict on the tangent, correct, secants to f = 1.
 
-Every accepted state is an equilibrium. The next one is sought where the tangent says f = 1 (for
+Every accepted state is an equilibrium. The next one is sought where the tangent gives f = 1 (for
 linear bodies exactly there). If f is below 1 it is a step on the way; if above, it is undone and
 the secant through both ends gives the next guess.
 """
@@ -170,7 +170,7 @@ class NewtonLoadPath:
             if (level - 1.0) * (after - 1.0) < 0.0:
                 other = begin
             if abs(after - 1.0) < _NEAR_ONE and abs(after - 1.0) > 0.5 * abs(level - 1.0):
-                return  # nearer than the iteration can tell
+                return  # nearer than the iteration can resolve
 
     def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
         """See :meth:`fxcrack.steps.load_path.LoadPath.back_to`.

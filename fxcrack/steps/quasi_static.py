@@ -42,7 +42,7 @@ def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
         Why the step ended.
 
     Raises:
-        InputError: Release laws, bodies and stepping do not go together.
+        InputError: Release laws, bodies and stepping are not compatible.
     """
     driver = StepDriver(analysis, step, **controls)
     _check_releases(analysis, step)
@@ -77,7 +77,7 @@ def _check_releases(analysis: Analysis, step: Static) -> None:
 
 
 def step_by_events(driver: StepDriver) -> str:
-    """Go from release to release, each at exactly f = 1; returns why the step ended."""
+    """Advance from release to release, each at exactly f = 1; returns why the step ended."""
     analysis = driver.analysis
     while True:
         driver.checkpoint_point()
@@ -232,7 +232,7 @@ def _never(driver: StepDriver) -> str:
 
 
 def _check_proportional(driver: StepDriver) -> None:
-    """Refuse what a load that moves forth and back cannot do."""
+    """Refuse what is impossible with a load that increases and decreases."""
     stepping = f"stepping='{driver.step.stepping}'"
     if driver.breaks:
         raise InputError(

@@ -48,7 +48,7 @@ def release_tips(
     Args:
         analysis: The analysis.
         g: The crack.
-        values: What its criterion says at the tips.
+        values: Values of its criterion at the tips.
         chosen: Positions of tips, shape (n,).
         moment: Time or number of cycles to record.
 

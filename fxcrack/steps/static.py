@@ -15,7 +15,7 @@ class Static:
 
     Args:
         until: End condition, or a list of them of which the first met ends the step.
-        stepping: "event" goes from release to release, each at exactly f = 1;
+        stepping: "event" advances from release to release, each at exactly f = 1;
             "increment" takes time increments and accepts 1 <= f <= 1 + tolerance, cutting back
             above; "path" keeps the load factor of a proportional load on the equilibrium path at
             f = 1, also where that means unloading (snap-back under load control); "opening" finds

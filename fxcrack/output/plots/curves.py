@@ -47,6 +47,9 @@ def growth_rows(history: History, interface: Interface | str | None = None) -> I
     Args:
         history: The history.
         interface: Which interface; any of them by default.
+
+    Returns:
+        Row numbers, increasing, shape (n,).
     """
     columns = [c for c in history.columns if c.startswith("released[")]
     if interface is not None:
@@ -154,7 +157,7 @@ def load_opening(
 
     def draw() -> Figure:
         figure, ax = new_figure()
-        width = 2.0 if len(curve.x) <= 60 else 1.4  # every release is a tooth
+        width = 2.0 if len(curve.x) <= 60 else 1.4  # every release is a drop of the load
         ax.plot(curve.x, curve.y, color=COLOURS[0], linewidth=width, label=label, zorder=3)
         if curve.onset is not None:
             at = curve.x[curve.onset], curve.y[curve.onset]
@@ -184,7 +187,7 @@ class Resistance:
     Attributes:
         length: Crack length, shape (n,), length.
         rates: G I, II, III at the critical front node, shape (n, 3), force/length; NaN if the
-            criterion does not tell.
+            criterion does not report them.
         f: Criterion there, shape (n,).
         onset: Whether the load changed since the release before: growth that runs on at one load
             is no equilibrium, its G may lie anywhere, shape (n,).
@@ -235,7 +238,8 @@ def r_curve(
         history: The history.
         path: Picture file (.png, .pdf, .svg).
         interface: Interface or its name.
-        toughness: Critical G to compare with, a number or a function of crack length.
+        toughness: Critical G to compare with [force/length], a number or a function of crack length
+            [length], shape (n,) -> (n,).
         quantity: "G" or "f".
         xlabel: What x is and its unit.
         ylabel: What y is and its unit.

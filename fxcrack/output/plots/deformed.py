@@ -61,7 +61,12 @@ class Shape:
 
 
 def outer_facets(continuum: Continuum) -> tuple[Ints, Ints]:
-    """Outer facets of this rank: their cells, and their displacement nodes in basix order."""
+    """Outer facets of this rank.
+
+    Returns:
+        Their cells, shape (n_facets,), and their displacement nodes of this rank in basix order,
+        shape (n_facets, nodes_per_facet).
+    """
     topology, tdim = continuum.mesh.domain.topology, continuum.mesh.tdim
     topology.create_connectivity(tdim - 1, tdim)
     _, cells, _, nodes = facet_nodes(continuum, dolfinx.mesh.exterior_facet_indices(topology))
@@ -145,8 +150,8 @@ def view_axes(up: Array, along: Array, azimuth: float, elevation: float) -> Arra
     Args:
         up: Direction that is upright in the picture, shape (3,).
         along: Direction to the right at azimuth 0, perpendicular to ``up``, shape (3,).
-        azimuth: Degrees by which the viewer goes to the left.
-        elevation: Degrees by which the viewer goes up.
+        azimuth: Degrees by which the viewer moves to the left.
+        elevation: Degrees by which the viewer moves up.
     """
     a, e = np.radians([azimuth, elevation])
     level = np.cos(a) * np.cross(along, up) - np.sin(a) * along
