@@ -163,7 +163,7 @@ def test_iteration_where_a_factorisation_would_not_fit(
     until = fx.Static(until=fx.Releases(1))
     sizes = {"dx": 5.0, "dy": 5.0, "ny": 1}
     one = dcb3(comm, **sizes)
-    monkeypatch.setattr("fxcrack.solvers.base.machine_memory_mb", lambda comm: 1.0)
+    monkeypatch.setattr("fxcrack.solvers.linear.machine_memory_mb", lambda comm: 1.0)
     with caplog.at_level(logging.WARNING, "fxcrack"):
         other = dcb3(comm, **sizes)
     if comm.rank == 0:
