@@ -66,7 +66,7 @@ def main() -> int:
 if __name__ == "__main__":
     try:
         status = min(main(), 1)
-    except Exception:
+    except Exception:  # a rank that fails must end the others too
         traceback.print_exc()
         end_all(MPI.COMM_WORLD, 2)
     sys.exit(status)
