@@ -425,8 +425,8 @@ class Scene:
     def close(self) -> None:
         """Free all PETSc objects; collective. The history stays.
 
-        On one rank this happens by itself when the scene is no longer used. On several it does not:
-        close scenes made in a loop, for MPI has a limited number of communicators.
+        It happens by itself when the scene is no longer used: on one rank at once, on several when
+        the next scene is made there.
         """
         self.solver.destroy()
 

@@ -22,6 +22,7 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
+from fxcrack.base import collective_garbage
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.continuum.dof_layout import DofLayout
@@ -90,6 +91,8 @@ class Continuum:
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order}: only displacements of order 1 and 2 exist")
         self.comm = mesh.comm
+        collective_garbage.collect(mesh.comm)
+        collective_garbage.watch(self, mesh.comm, mesh.domain.comm)
         self.gdim = mesh.gdim
         self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (self.gdim,)))
         n_owned = int(self.space.dofmap.index_map.size_local)

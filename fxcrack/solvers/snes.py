@@ -432,9 +432,9 @@ def _drive(problem: InterfaceSnes, y: PETSc.Vec) -> tuple[int, int]:
             ) from problem.error
         raise problem.error or error from error
     finally:
-        snes.destroy()
-        operator.destroy()
-        work.destroy()
+        # All of them: on several ranks what is left to Python would keep the problem for ever.
+        for thing in (pc, ksp, snes, operator, work):
+            thing.destroy()
 
 
 __all__ = ["Counts", "InterfaceSnes", "solve"]
