@@ -11,6 +11,7 @@ from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
     Amplitude,
     BodyForce,
@@ -129,6 +130,7 @@ __all__ = [
     "Interface",
     "Interrupted",
     "Isotropic",
+    "Laminate",
     "Mesh",
     "Monitor",
     "NeoHookean",
@@ -138,6 +140,7 @@ __all__ = [
     "PlaneStrain",
     "PlaneStress",
     "Plastic",
+    "Ply",
     "PointForce",
     "Power",
     "Pressure",
