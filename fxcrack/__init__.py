@@ -9,8 +9,10 @@ from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
     Amplitude,
     BodyForce,
@@ -108,6 +110,7 @@ __all__ = [
     "ByTemperature",
     "Checkpoint",
     "CondensedOptions",
+    "ContinuumShell",
     "CrackLength",
     "CrackLengthVsTime",
     "CrackOpening",
@@ -129,6 +132,7 @@ __all__ = [
     "Interface",
     "Interrupted",
     "Isotropic",
+    "Laminate",
     "Mesh",
     "Monitor",
     "NeoHookean",
@@ -138,6 +142,7 @@ __all__ = [
     "PlaneStrain",
     "PlaneStress",
     "Plastic",
+    "Ply",
     "PointForce",
     "Power",
     "Pressure",
