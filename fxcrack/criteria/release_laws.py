@@ -155,7 +155,7 @@ class ProgressiveRelease(ReleaseLaw):
     """The force falls linearly with opening so that exactly the toughness is dissipated.
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
-    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A/|F0|.
+    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A divided by the size of F0.
     """
 
     driver: ClassVar[Driver] = "opening"
