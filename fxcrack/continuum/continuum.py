@@ -24,15 +24,20 @@ from petsc4py import PETSc
 
 from fxcrack.base import collective_garbage
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import whole
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.kinematics import Axisymmetric, Model
 from fxcrack.continuum.loads import Field
-from fxcrack.continuum.materials import Material
+from fxcrack.continuum.materials import Material, stiffness_of
 from fxcrack.continuum.shell_cells import ShellCells
 from fxcrack.continuum.temperature import ByTemperature, Temperature
-from fxcrack.continuum.temperature_field import TemperatureField, interpolated
+from fxcrack.continuum.temperature_field import (
+    TemperatureField,
+    interpolate_given,
+    interpolated,
+)
 from fxcrack.mesh import Mesh
 
 Ints = npt.NDArray[np.int32]
@@ -90,7 +95,7 @@ class Continuum:
             )
         self.mesh = mesh
         self.model = model
-        self.order = mesh.order if order is None else order
+        self.order = mesh.order if order is None else whole("Scene", "order", order)
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order}: only displacements of order 1 and 2 exist")
         self.comm = mesh.comm
@@ -111,13 +116,6 @@ class Continuum:
         self.temperature: TemperatureField | None = None
         if temperature is not None:
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
-        listed = materials.values() if isinstance(materials, Mapping) else [materials]
-        for material in listed:
-            if isinstance(material, type) or not hasattr(material, "stiffness"):
-                raise InputError(
-                    f"materials: {material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
-                    "nu=0.3), or one per cell group, {'name': Isotropic(...)}"
-                )
         self.part_materials: list[Material] = []
         self.part_cells: list[Ints] = []
         self.shell_cells: dict[int, ShellCells] = {}
@@ -228,10 +226,10 @@ class Continuum:
         material, model = self.part_materials[i], self.model
         if self.temperature is not None and isinstance(material, ByTemperature):
             return (
-                self.by_temperature(i, lambda m: model.reduce(m.stiffness())),
-                self.by_temperature(i, lambda m: model.recover(m.stiffness())),
+                self.by_temperature(i, lambda m: model.reduce(stiffness_of(m))),
+                self.by_temperature(i, lambda m: model.recover(stiffness_of(m))),
             )
-        domain, c = self.mesh.domain, material.stiffness()
+        domain, c = self.mesh.domain, stiffness_of(material)
         return (
             fem.Constant(domain, self.model.reduce(c)),
             fem.Constant(domain, self.model.recover(c)),
@@ -283,8 +281,18 @@ class Continuum:
         )
         return ufl.Measure("dx", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
 
-    def field(self, value: Field) -> Any:
-        """A number as a UFL constant, a function of positions interpolated in each cell."""
+    def field(self, value: Field, title: str) -> Any:
+        """A number as a UFL constant, a function of positions interpolated in each cell.
+
+        Collective.
+
+        Args:
+            value: The number or function.
+            title: What it is the value of, for messages.
+
+        Raises:
+            InputError: The function fails or gives other than one number per position.
+        """
         if not callable(value):
             return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
         # points inside the cells: a step at a cell boundary stays a step
@@ -299,16 +307,7 @@ class Continuum:
             function.interpolate(value)
             return function
 
-        def at(x: Array) -> Array:
-            found = np.asarray(value(x), dtype=PETSc.ScalarType)
-            if found.shape not in ((), (x.shape[1],), (1, x.shape[1])):
-                raise InputError(
-                    f"a function of position of a load gives shape {found.shape} at {x.shape[1]} "
-                    "positions x of shape (3, n); return one number per position, shape (n,)"
-                )
-            return np.array(np.broadcast_to(found, (1, x.shape[1]))[0])
-
-        function.interpolate(at)
+        interpolate_given(self.comm, function, title, "value", value)
         return function
 
     def owned_nodes(self, where: str) -> Ints:
