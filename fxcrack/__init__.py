@@ -5,7 +5,7 @@ import warnings
 from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # noqa: F401  # isort: skip  (orders MPI before DOLFINx)
-from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.base.errors import EnergyError, FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
@@ -121,6 +121,7 @@ __all__ = [
     "Debond",
     "Displacement",
     "Dynamic",
+    "EnergyError",
     "EnhancedVCCT",
     "Evaluator",
     "Fatigue",

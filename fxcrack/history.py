@@ -9,8 +9,9 @@ time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[.
 its work-conjugate displacement, m[..] monitored displacement, a[..] crack length, area[..] open
 area, f[..] largest criterion value and GI, GII, GIII[..] there, node[..] where, released[..]
 number of released nodes; strain_energy, external_work, released_energy, balance; where they occur
-viscous_energy, snap_energy (part of released_energy), and in fatigue steps N, G_max[..], dG[..],
-dadN[..].
+viscous_energy, snap_energy (part of released_energy), overlap_energy (given by contact as it pushes
+overlapping faces apart), initial_kinetic_energy (of a given velocity), and in fatigue steps N,
+G_max[..], dG[..], dadN[..].
 """
 
 from __future__ import annotations

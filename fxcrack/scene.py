@@ -60,6 +60,7 @@ from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import CrackLength, Time
+from fxcrack.steps.energy_check import check_energy
 from fxcrack.steps.progress import Progress
 from fxcrack.steps.quasi_static import run_static
 from fxcrack.steps.rows import Observer
@@ -319,6 +320,8 @@ class Scene:
                 any number of ranks.
 
         Raises:
+            EnergyError: The energies of the step do not balance to 1 % of the largest one (beyond
+                0.1 % it is a warning). The history is kept.
             AccuracyError: The accuracy is not reached, or cannot be judged; says what would reach
                 it. The history is kept.
             InputError: The scene and the step are not compatible, or the checkpoint belongs to
@@ -346,10 +349,12 @@ class Scene:
                 log.warn("%s, so nothing can debond", why_no_tip(g.front))
         restarts = self._files.manager(analysis, step, may_grow, checkpoint, restart, save)
         self._prepare(restarts, may_grow, step)
+        first = len(self.history)
         self.history.reason = restarts.finished or self._go(
             step, restarts, progress=progress, observers=observers
         )
         self.history.details = self._details()
+        check_energy(self.history, first)
         if accuracy is not None:
             self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
         return self.history
@@ -392,6 +397,7 @@ class Scene:
             for pair, held in zip(self.pairs, solver.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
             solver.start()
+            analysis.book_start()
         analysis.started = True
 
     def _go(
