@@ -9,19 +9,24 @@ from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.loads import (
     Amplitude,
     BodyForce,
     Displacement,
+    Moment,
     Monitor,
     PointForce,
+    PointMoment,
     Pressure,
     Ramp,
     Traction,
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
+from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
+from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import ByTemperature, Temperature
 from fxcrack.criteria import (
     BK,
@@ -107,6 +112,7 @@ __all__ = [
     "BondHistory",
     "ByTemperature",
     "Checkpoint",
+    "Clamp",
     "CondensedOptions",
     "CrackLength",
     "CrackLengthVsTime",
@@ -119,6 +125,7 @@ __all__ = [
     "Dynamic",
     "EnhancedVCCT",
     "Evaluator",
+    "Face",
     "Fatigue",
     "FieldSeries",
     "FiniteStrain",
@@ -130,6 +137,7 @@ __all__ = [
     "Interrupted",
     "Isotropic",
     "Mesh",
+    "Moment",
     "Monitor",
     "NeoHookean",
     "NewtonOptions",
@@ -139,6 +147,7 @@ __all__ = [
     "PlaneStress",
     "Plastic",
     "PointForce",
+    "PointMoment",
     "Power",
     "Pressure",
     "ProgressiveRelease",
@@ -147,11 +156,15 @@ __all__ = [
     "Reeder",
     "ReleaseLaw",
     "Releases",
+    "Rotation",
     "Scene",
+    "Section",
+    "Shell",
     "Solid",
     "Split",
     "Static",
     "StepRelease",
+    "Symmetry",
     "Tabulated",
     "Temperature",
     "Time",

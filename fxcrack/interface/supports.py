@@ -15,8 +15,12 @@ from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError, InterfaceError, raise_on_all_ranks
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Displacement
+from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry, rotation_values
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
+
+AnySupport = Displacement | Support
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,7 @@ class SupportColumn:
     """
 
     title: str
-    support: Displacement
+    support: AnySupport
     moves: bool
     scale: float
 
@@ -70,35 +74,80 @@ class Supports:
         return nodes.share(self.which[dofs]), nodes.share(self.value[dofs])
 
 
-def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supports:
+def _prescribed(
+    continuum: Continuum, support: AnySupport, nodes: Ints
+) -> list[tuple[str, Ints, Array]]:
+    """Name, unknown of each node (-1 for none) and value there of what a support prescribes.
+
+    Args:
+        continuum: The bodies.
+        support: The support.
+        nodes: Nodes of its group that this rank owns, shape (n,).
+
+    Raises:
+        InputError: The support does not fit the bodies; collective.
+    """
+    gdim, n = continuum.gdim, len(nodes)
+    x = continuum.positions()[nodes]
+    if isinstance(support, Displacement):
+        out = []
+        for component, field in enumerate((support.x, support.y, support.z)):
+            if field is None:
+                continue
+            if component >= gdim:
+                raise InputError(
+                    f"Displacement('{support.title}') prescribes {'xyz'[component]} in {gdim} "
+                    "dimensions"
+                )
+            value = np.asarray(field(x.T) if callable(field) else field, dtype=float)
+            out.append(("xyz"[component], np.full(n, component), np.broadcast_to(value, (n,))))
+        return out
+    names = ["xyz"[c] for c in range(gdim)]
+    if isinstance(continuum, ShellBodies):
+        names += ["wx", "wy", "wz"]
+    if isinstance(support, Rotation):
+        if not isinstance(continuum, ShellBodies):
+            raise InputError(
+                f"Rotation('{support.title}'): only shells have rotations; prescribe displacements "
+                "that vary over the thickness"
+            )
+        found: list[tuple[str, Array, Array]] = []
+        problem = None
+        try:
+            found = rotation_values(support, continuum.directors[nodes], x)
+        except InputError as error:
+            problem = str(error)
+        raise_on_all_ranks(continuum.comm, problem)
+        return [(name, np.where(c < 0, -1, gdim + c), value) for name, c, value in found]
+    if isinstance(support, Symmetry):
+        names = [name for name in names if name[-1] == support.axis]
+        if not names:
+            raise InputError(f"Symmetry('{support.title}'): there is no axis {support.axis}")
+    assert isinstance(support, Clamp | Symmetry)
+    number = {"x": 0, "y": 1, "z": 2, "wx": 3, "wy": 4, "wz": 5}
+    return [(name, np.full(n, number[name]), np.zeros(n)) for name in names]
+
+
+def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Supports:
     """Number the prescribed components and place them on the dofs; collective.
 
     Raises:
         InputError: Two supports prescribe different values for one dof, or a value is not finite.
     """
-    gdim, layout = continuum.gdim, continuum.layout
+    layout = continuum.layout
     which = np.full(layout.n_local, -1, dtype=np.int64)
     value = np.zeros(layout.n_local)
     columns: list[SupportColumn] = []
     problem = None
     x = continuum.positions()
     for support in supports:
-        nodes = continuum.owned_nodes(support.where)
-        for axis, field in zip("xyz", (support.x, support.y, support.z), strict=True):
-            if field is None:
-                continue
-            component = "xyz".index(axis)
-            if component >= gdim:
-                raise InputError(
-                    f"Displacement('{support.title}') prescribes {axis} in {gdim} dimensions"
-                )
-            dofs = layout.dof(nodes, component)
-            values = np.broadcast_to(
-                np.asarray(field(x[nodes].T) if callable(field) else field, dtype=float),
-                (len(nodes),),
-            )
+        group = continuum.owned_nodes(support.where).astype(np.int64)
+        kind = type(support).__name__
+        for axis, unknown, wanted in _prescribed(continuum, support, group):
+            nodes, values = group[unknown >= 0], wanted[unknown >= 0]
+            dofs = layout.dof(nodes, unknown[unknown >= 0])
             if not np.all(np.isfinite(values)):
-                problem = f"Displacement('{support.title}'): {axis} is not a finite number"
+                problem = f"{kind}('{support.title}'): {axis} is not a finite number"
             taken = which[dofs] >= 0
             other = np.array([c.support.amplitude != support.amplitude for c in columns] + [False])
             differs = (value[dofs] != values) | (other[which[dofs]] & (values != 0.0))
@@ -113,6 +162,11 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
             which[dofs[free]], value[dofs[free]] = len(columns), values[free]
             low = continuum.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
             high = continuum.comm.allreduce(float(values.max(initial=-np.inf)), op=MPI.MAX)
+            if low > high:
+                problem = (
+                    f"{kind}('{support.title}'): {axis} prescribes nothing, the director of all "
+                    "nodes lies along that axis"
+                )
             moves = low != 0.0 or high != 0.0
             scale = high if moves and low == high else 1.0
             columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale))
