@@ -12,6 +12,7 @@ from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
+from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
     Amplitude,
     BodyForce,
@@ -136,6 +137,7 @@ __all__ = [
     "Interface",
     "Interrupted",
     "Isotropic",
+    "Laminate",
     "Mesh",
     "Moment",
     "Monitor",
@@ -146,6 +148,7 @@ __all__ = [
     "PlaneStrain",
     "PlaneStress",
     "Plastic",
+    "Ply",
     "PointForce",
     "PointMoment",
     "Power",

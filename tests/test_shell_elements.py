@@ -36,7 +36,9 @@ def flat(
 ) -> fx.Mesh:
     cell, order = ELEMENTS[kind]
     axes = [np.linspace(0.0, s, k + 1) for s, k in zip(size, n, strict=True)]
-    return sheets([Sheet("plate", *axes, distort=distort)], comm, cell=cell, order=order)
+    points = {"middle": (axes[0][n[0] // 2], 0.0)}
+    shape = Sheet("plate", *axes, points=points, distort=distort)
+    return sheets([shape], comm, cell=cell, order=order)
 
 
 @pytest.mark.mpi
@@ -263,3 +265,55 @@ def test_ranks_agree(comm: MPI.Intracomm, kind: str) -> None:
     n = 4 if kind == "Q2" else 8
     assert hemisphere(comm, kind, n) == pytest.approx(BALL[kind][1], abs=SAME)
     assert roof(comm, kind, n) == pytest.approx(ROOF[kind][1], abs=SAME)
+
+
+# -- sections --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("angles", "ratio", "wanted"),
+    [((0, 90, 0), 10, 0.997), ((0, 90, 0), 100, 0.994), ((0, 90), 100, 0.993)],
+)
+def test_laminated_strip(
+    comm: MPI.Intracomm, angles: tuple[float, ...], ratio: int, wanted: float
+) -> None:
+    """Cylindrical bending under q = sin(pi x/L) (Pagano 1969), over first-order shear theory."""
+    ply = fx.Orthotropic(E=(25e6, 1e6, 1e6), nu=(0.25, 0.25, 0.25), G=(0.5e6, 0.5e6, 0.2e6))
+    height = 1.0 / ratio
+    laminate = fx.Laminate([fx.Ply(height / len(angles), a) for a in angles], material=ply)
+    scene = fx.Scene(
+        flat(comm, "Q1", (16, 1), (1.0, 0.05)),
+        model=fx.Shell(),
+        materials=fx.Section(laminate),
+        supports=[
+            fx.Displacement("plate_a0", z=0.0),
+            fx.Displacement("plate_a1", z=0.0),
+            fx.Symmetry("plate", "y"),
+            # both ends move alike; the middle stays
+            fx.Displacement("plate_a0b0", x=0.0),
+        ],
+        loads=[fx.Traction(fx.Face("plate", "top"), (0.0, 0.0, lambda x: np.sin(np.pi * x[0])))],
+        monitors=[fx.Monitor("middle", (0, 0, 1), name="w")],
+    )
+    abd = laminate.abd()
+    bending = abd[3, 3] - abd[0, 3] ** 2 / abd[0, 0]
+    shear = laminate.shear_stiffness()[1, 1]
+    exact = 1.0 / (bending * np.pi**4) + 1.0 / (shear * np.pi**2)
+    assert solved(scene) / exact == pytest.approx(wanted, abs=SAME)
+
+
+def test_offset_moves_the_reference_surface(comm: MPI.Intracomm) -> None:
+    """A plate whose mesh lies on its bottom bends as one whose mesh lies in its middle."""
+    material, thickness = fx.Isotropic(70e3, 0.0), 2.0
+    found = []
+    for offset in (0.0, 0.5 * thickness):
+        scene = fx.Scene(
+            flat(comm, "Q1", (16, 1), (50.0, 4.0)),
+            model=fx.Shell(),
+            materials=fx.Section(material, thickness=thickness, offset=offset),
+            supports=[fx.Clamp("plate_a0")],
+            loads=[fx.Moment("plate_a1", (0.0, -1.0, 0.0))],
+            monitors=[fx.Monitor("plate_a1", (0, 0, 1), name="w")],
+        )
+        found.append(solved(scene))
+    assert found[1] == pytest.approx(found[0], rel=1e-9)

@@ -104,13 +104,7 @@ class Orthotropic:
                 f"Orthotropic: nu = {self.nu} with E = {self.E} is no stable material "
                 "(compliance not positive definite); check the order nu12, nu13, nu23"
             )
-        axis1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
-        if not np.all(np.isfinite(self.frame)):
-            raise InputError(f"Orthotropic: frame = {self.frame} must hold finite numbers")
-        if np.linalg.norm(np.cross(axis1, in_plane)) < 1e-8 * np.linalg.norm(axis1) * max(
-            float(np.linalg.norm(in_plane)), 1e-300
-        ):
-            raise InputError(f"Orthotropic: the two vectors of frame = {self.frame} are parallel")
+        frame_axes("Orthotropic", self.frame)
         if np.shape(self.expansion) != (3,):
             raise InputError(
                 f"Orthotropic: expansion = {self.expansion} must be three numbers, one per axis"
@@ -142,11 +136,35 @@ class Orthotropic:
 
     def _to_local(self) -> Array:
         """Takes a strain from global axes to the frame, shape (6, 6)."""
-        e1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
-        e1 = e1 / np.linalg.norm(e1)
-        e3 = np.cross(e1, in_plane)
-        e3 /= np.linalg.norm(e3)
-        return strain_rotation(np.vstack([e1, np.cross(e3, e1), e3]))
+        return strain_rotation(frame_axes("Orthotropic", self.frame))
+
+
+def frame_axes(name: str, frame: tuple[tuple[float, ...], tuple[float, ...]]) -> Array:
+    """Unit vectors of material axes from two directions.
+
+    Args:
+        name: Whose frame it is, for messages.
+        frame: Global directions of axis 1 and of a vector in the plane of axes 1 and 2.
+
+    Returns:
+        Rows are axes 1, 2, 3 in global components, shape (3, 3).
+
+    Raises:
+        InputError: They are not two vectors of three numbers, or they are parallel.
+    """
+    if np.shape(frame) != (2, 3) or np.asarray(frame).dtype.kind not in "fiu":
+        raise InputError(f"{name}: frame = {frame!r} must be two vectors of three numbers")
+    if not np.all(np.isfinite(frame)):
+        raise InputError(f"{name}: frame = {frame} must hold finite numbers")
+    axis1, in_plane = (np.asarray(v, dtype=float) for v in frame)
+    if np.linalg.norm(np.cross(axis1, in_plane)) < 1e-8 * np.linalg.norm(axis1) * max(
+        float(np.linalg.norm(in_plane)), 1e-300
+    ):
+        raise InputError(f"{name}: the two vectors of frame = {frame} are parallel")
+    e1 = axis1 / np.linalg.norm(axis1)
+    e3 = np.cross(e1, in_plane)
+    e3 /= np.linalg.norm(e3)
+    return np.vstack([e1, np.cross(e3, e1), e3])
 
 
 def _check_numbers(name: str, **values: object) -> None:

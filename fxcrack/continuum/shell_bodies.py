@@ -91,7 +91,11 @@ class ShellBodies(Continuum):
         order: int | None = None,
         temperature: Temperature | None = None,
     ) -> None:
-        super().__init__(mesh, materials, model, order=order, temperature=temperature)
+        if temperature is not None:
+            raise InputError(
+                "Temperature is not possible in shells yet; model the part with solids"
+            )
+        super().__init__(mesh, materials, model, order=order)
         self.shell = model
         kind = mesh.domain.topology.cell_name()
         if kind == "triangle" and self.order == 2:

@@ -118,7 +118,7 @@ def _cells_of(shell: ShellBodies, part: ShellPart, where: str | None) -> Ints:
 def _positions(shell: ShellBodies, part: ShellPart, rows: Ints) -> Array:
     """Reference surface at the integration points, shape (n_cells, n_points, 3)."""
     x = part.strain_cells.vectors[rows, ::2]
-    return np.einsum("pk,ckx->cpx", shell.element.values, x)
+    return np.asarray(np.einsum("pk,ckx->cpx", shell.element.values, x))
 
 
 def _spread(shell: ShellBodies, part: ShellPart, rows: Ints, on_u: Array, on_w: Array) -> Any:
@@ -153,7 +153,7 @@ def _body_force(shell: ShellBodies, load: BodyForce) -> PETSc.Vec:
         rows = _cells_of(shell, part, load.where)
         x = _positions(shell, part, rows)
         force = np.stack([_at_points(v, x, load.title) for v in load.value], axis=-1)
-        low, high = part.section.bottom, part.section.top
+        low, high = part.section.face("bottom"), part.section.face("top")
         parts.append(
             _spread(shell, part, rows, (high - low) * force, 0.5 * (high**2 - low**2) * force)
         )

@@ -104,12 +104,14 @@ class StrainCells:
             coupling = enhanced.transpose(0, 2, 1) @ stress
             inner = self._inner(at)
             tangent -= coupling.transpose(0, 2, 1) @ np.linalg.solve(inner, coupling)
-        return tangent
+        return np.asarray(tangent)
 
     def _inner(self, at: slice) -> Array:
         """N^t C N, shape (n, n_enhanced, n_enhanced)."""
         enhanced = self.enhanced[at]
-        return np.einsum("cpsa,cpst,cptb->cab", enhanced, self.moduli[at], enhanced, optimize=True)
+        return np.asarray(
+            np.einsum("cpsa,cpst,cptb->cab", enhanced, self.moduli[at], enhanced, optimize=True)
+        )
 
     def stiffness(self) -> Array:
         """Tangent in the undeformed body, shape (n_cells, 3 n_vectors, 3 n_vectors)."""
