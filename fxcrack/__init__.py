@@ -9,6 +9,7 @@ from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
@@ -115,6 +116,7 @@ __all__ = [
     "Checkpoint",
     "Clamp",
     "CondensedOptions",
+    "ContinuumShell",
     "CrackLength",
     "CrackLengthVsTime",
     "CrackOpening",

@@ -23,6 +23,7 @@ from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.loads import Field
+from fxcrack.continuum.reduced_integration import whole_measure
 from fxcrack.continuum.term import Term
 
 
@@ -193,6 +194,7 @@ class InertiaForces(Term):
         c = self._continuum
         total = 0
         for density, (_, _, dx) in zip(self._densities, c.parts, strict=True):
+            dx = whole_measure(dx)
             if self._effect.lumped:
                 dx = dx.reconstruct(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
             total += density * ufl.inner(a, v) * c.weight * dx

@@ -30,6 +30,9 @@ Frame = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 _IN, _OUT = [0, 1, 5], [2, 3, 4]
 """Components in the plane of the plies and those across it."""
+_ODD_ANGLE = 37.0
+"""Degrees; no layer of fibres is symmetric about it."""
+_ROUND_OFF = 1e-10
 
 
 @dataclass(frozen=True)
@@ -197,6 +200,26 @@ class Laminate:
         height = np.concatenate([[0.0], np.cumsum([p.thickness for p in self.plies])])
         return np.asarray(height - 0.5 * height[-1] + offset)
 
+    def part(self, low: float, high: float) -> Laminate:
+        """The plies, whole or cut, between two fractions of the thickness from the bottom.
+
+        Args:
+            low: Where the part begins, 0 at the bottom.
+            high: Where it ends, 1 at the top.
+        """
+        z = self.interfaces() / self.thickness + 0.5
+        cut = np.diff(np.clip(z, low, high)) * self.thickness
+        return self._stacked(
+            tuple(replace(p, thickness=t) for p, t in zip(self.plies, cut, strict=True) if t > 0.0)
+        )
+
+    @property
+    def is_isotropic_in_plane(self) -> bool:
+        """Whether every ply stays the same when it is turned in its plane."""
+        pairs = zip(self.plies, self.turned(_ODD_ANGLE).plies, strict=True)
+        stiffnesses = [(p.stiffness(), q.stiffness()) for p, q in pairs]
+        return all(np.abs(c - d).max() <= 1e-10 * np.abs(c).max() for c, d in stiffnesses)
+
     def _stacked(self, plies: tuple[Ply, ...]) -> Laminate:
         return Laminate(plies, frame=self.frame)
 
@@ -293,6 +316,32 @@ class Laminate:
         z = self.interfaces(offset)
         powers = [np.diff(z ** (k + 1)) / (k + 1) for k in range(degree + 1)]
         return np.tensordot(np.array(powers), np.array(values), axes=1)
+
+    def polynomial(self, degree: int) -> Array:
+        """Stiffness over the thickness as the polynomial that has the laminate's moments.
+
+            C(zeta) = sum_i c_i zeta^i,   int zeta^k C dzeta that of the plies for k <= degree
+
+        with zeta = z/thickness. The energy of strains that are polynomials in zeta of half the
+        degree is exact, for any number of plies.
+
+        Args:
+            degree: Highest power of zeta.
+
+        Returns:
+            c_i in laminate axes, shape (degree + 1, 6, 6), force/length^2; exactly 0 where
+            round-off alone remains.
+        """
+        powers = np.arange(degree + 1)
+        moments = self.moments(degree) / (self.thickness ** (powers + 1))[:, None, None]
+        k = powers[:, None] + powers[None] + 1
+        gram = (0.5**k - (-0.5) ** k) / k
+        c = np.tensordot(np.linalg.inv(gram), moments, axes=1)
+        c[np.abs(c) <= _ROUND_OFF * np.abs(c).max()] = 0.0
+        first, *others = (p.stiffness() for p in self.plies)
+        if all(np.abs(o - first).max() <= _ROUND_OFF * np.abs(first).max() for o in others):
+            c[1:] = 0.0
+        return c
 
     # -- as the material of solid cells -----------------------------------------------------------
 
