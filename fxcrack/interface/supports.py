@@ -311,6 +311,7 @@ def check_slaves(
                 which[masters], value[masters], supports,
             )  # fmt: skip
             if column is None:
+                _check_points_held(pair, node, which[slave[node]], which[masters], supports)
                 continue
             if pair.bonded[node]:
                 raise InterfaceError(
@@ -327,6 +328,38 @@ def check_slaves(
                     format_point(pair.surface.x[node]),
                     column.title,
                 )
+
+
+def _check_points_held(
+    pair: Pair, node: int, which: Ints, master_which: Ints, supports: Supports
+) -> None:
+    """Refuse a bonded node whose nodes are held, but not the points of both faces.
+
+    Args:
+        pair: The interface.
+        node: Slave node, held like its masters.
+        which: Support columns of its unknowns, -1 if free, shape (n_unknowns,).
+        master_which: Those of its masters, shape (k, n_unknowns).
+        supports: The columns.
+
+    Raises:
+        InterfaceError: Its further unknowns (change of a director) are not held.
+    """
+    maps, on_master = pair.surface.point_maps, pair.master_maps
+    if maps is None or on_master is None or not pair.bonded[node]:
+        return
+    gdim = maps.shape[1]
+    for c in np.flatnonzero(which[:gdim] >= 0):
+        moved = np.flatnonzero(maps[node, c] != 0.0)
+        below = np.flatnonzero((on_master[node, :, c] != 0.0).any(axis=0))
+        if np.all(which[moved] >= 0) and np.all(master_which[:, below] >= 0):
+            continue
+        raise InterfaceError(
+            f"support '{supports.columns[int(which[c])].title}' holds the reference surface at "
+            f"the bonded node at {format_point(pair.surface.x[node])} of interface "
+            f"'{pair.title}', but not the director that moves its face; hold both by Symmetry or "
+            "Clamp, or end the support before the bonded part"
+        )
 
 
 def _unshared_support(
