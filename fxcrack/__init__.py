@@ -10,20 +10,25 @@ from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum_shell import ContinuumShell
+from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
     Amplitude,
     BodyForce,
     Displacement,
+    Moment,
     Monitor,
     PointForce,
+    PointMoment,
     Pressure,
     Ramp,
     Traction,
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
+from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
+from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import ByTemperature, Temperature
 from fxcrack.criteria import (
     BK,
@@ -110,6 +115,7 @@ __all__ = [
     "BondHistory",
     "ByTemperature",
     "Checkpoint",
+    "Clamp",
     "CondensedOptions",
     "ContinuumShell",
     "CrackLength",
@@ -124,6 +130,7 @@ __all__ = [
     "EnergyError",
     "EnhancedVCCT",
     "Evaluator",
+    "Face",
     "Fatigue",
     "FieldSeries",
     "FiniteStrain",
@@ -136,6 +143,7 @@ __all__ = [
     "Isotropic",
     "Laminate",
     "Mesh",
+    "Moment",
     "Monitor",
     "NeoHookean",
     "NewtonOptions",
@@ -147,6 +155,7 @@ __all__ = [
     "Ply",
     "PlyResults",
     "PointForce",
+    "PointMoment",
     "Power",
     "Pressure",
     "ProgressiveRelease",
@@ -155,11 +164,15 @@ __all__ = [
     "Reeder",
     "ReleaseLaw",
     "Releases",
+    "Rotation",
     "Scene",
+    "Section",
+    "Shell",
     "Solid",
     "Split",
     "Static",
     "StepRelease",
+    "Symmetry",
     "Tabulated",
     "Temperature",
     "Time",

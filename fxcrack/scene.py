@@ -27,17 +27,29 @@ from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.kinematics import (
+    Axisymmetric,
+    Model,
+    PlaneStrain,
+    PlaneStress,
+    Shell,
+    Solid,
+)
 from fxcrack.continuum.loads import (
     BodyForce,
     Displacement,
     Load,
+    Moment,
     Monitor,
     PointForce,
+    PointMoment,
     Pressure,
     Traction,
 )
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry
+from fxcrack.continuum.section import Section
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
 from fxcrack.error_estimate import as_details, check_accuracy, demand
@@ -78,9 +90,9 @@ class SceneInput:
     """
 
     mesh: Mesh
-    materials: Material | Mapping[str, Material]
-    model: Model
-    supports: Sequence[Displacement] = ()
+    materials: Material | Section | Mapping[str, Material] | Mapping[str, Section]
+    model: Model | Shell
+    supports: Sequence[Displacement | Support] = ()
     loads: Sequence[Load] = ()
     debonds: Sequence[Debond] = ()
     bonds: Sequence[Interface] = ()
@@ -95,10 +107,14 @@ class SceneInput:
         """Check kinds and names."""
         check_instance("Scene", "mesh", self.mesh, Mesh, "read_mesh('mine.msh')")
         check_instance(
-            "Scene", "model", self.model, (PlaneStrain, PlaneStress, Axisymmetric, Solid), "Solid()"
+            "Scene",
+            "model",
+            self.model,
+            (PlaneStrain, PlaneStress, Axisymmetric, Solid, Shell),
+            "Solid()",
         )
-        self._take_list("supports", Displacement)
-        self._take_list("loads", (Traction, Pressure, BodyForce, PointForce))
+        self._take_list("supports", (Displacement, Clamp, Symmetry, Rotation))
+        self._take_list("loads", (Traction, Pressure, BodyForce, PointForce, Moment, PointMoment))
         check_amplitudes([*self.supports, *self.loads])
         warn_of_same_titles("loads", self.loads)
         self._take_list("debonds", Debond)
@@ -159,7 +175,7 @@ class Scene:
 
     Args:
         mesh: Mesh with named groups.
-        materials: One material, or one per cell group.
+        materials: One material (a :class:`Section` of shells), or one per cell group.
         model: Kinematic model.
         supports: Prescribed displacements.
         loads: Force patterns.
@@ -187,9 +203,9 @@ class Scene:
         self,
         mesh: Mesh,
         *,
-        materials: Material | Mapping[str, Material],
-        model: Model,
-        supports: Sequence[Displacement] = (),
+        materials: Material | Section | Mapping[str, Material] | Mapping[str, Section],
+        model: Model | Shell,
+        supports: Sequence[Displacement | Support] = (),
         loads: Sequence[Load] = (),
         debonds: Sequence[Debond] = (),
         bonds: Sequence[Interface] = (),
@@ -510,7 +526,8 @@ def _solver_of_path(path: str, solver: str | None) -> str:
 
 def _analysis(given: SceneInput) -> Analysis:
     """The analysis of a scene; collective."""
-    continuum = Continuum(
+    kind: Any = ShellBodies if isinstance(given.model, Shell) else Continuum
+    continuum: Continuum = kind(
         given.mesh,
         given.materials,
         given.model,

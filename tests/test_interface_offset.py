@@ -38,9 +38,9 @@ class OffsetLayout(DofLayout):
         super().__init__(layout.comm, layout.gdim, layout.n_owned, n_unknowns)
         self._x = continuum.positions()
 
-    def point_maps(self, name: str, nodes: npt.NDArray[np.integer]) -> Array:
+    def point_maps(self, name: str | fx.Face, nodes: npt.NDArray[np.integer]) -> Array:
         """[1, z A] with A unlike the identity."""
-        z = OFFSETS[name] * (1.0 + 0.25 * self._x[nodes, 0])
+        z = OFFSETS[str(name)] * (1.0 + 0.25 * self._x[nodes, 0])
         further = np.eye(self.gdim, self.n_unknowns - self.gdim) + 0.125
         one = np.broadcast_to(np.eye(self.gdim), (*nodes.shape, self.gdim, self.gdim))
         return np.concatenate([one, z[..., None, None] * further], axis=-1)

@@ -327,8 +327,8 @@ def test_faults_are_raised_on_all_ranks(
 
 def test_wrong_dimension_and_missing_model(comm: MPI.Comm) -> None:
     build = lambda gmsh: discrete(gmsh, 2, [TRIANGLE])  # noqa: E731
-    with on_root(comm, build) as gmsh, pytest.raises(MeshError, match="2-dimensional, but gdim=3"):
-        mesh_from_gmsh(gmsh and gmsh.model, comm, gdim=3)
+    with on_root(comm, build) as gmsh, pytest.raises(MeshError, match="2-dimensional, but gdim=4"):
+        mesh_from_gmsh(gmsh and gmsh.model, comm, gdim=4)
     with pytest.raises(MeshError, match="rank 0 got no gmsh model"):
         mesh_from_gmsh(None, comm)
 

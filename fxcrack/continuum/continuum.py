@@ -9,7 +9,7 @@ columns of the coordinate transformation (:mod:`fxcrack.interface.jump_coordinat
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import basix
@@ -28,7 +28,8 @@ from fxcrack.base.checks import whole
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.dof_layout import DofLayout
-from fxcrack.continuum.kinematics import Axisymmetric, Model
+from fxcrack.continuum.face import Face
+from fxcrack.continuum.kinematics import Axisymmetric, Model, Shell
 from fxcrack.continuum.loads import Field
 from fxcrack.continuum.materials import Material, stiffness_of
 from fxcrack.continuum.shell_cells import ShellCells
@@ -73,7 +74,7 @@ class Continuum:
         self,
         mesh: Mesh,
         materials: Material | Mapping[str, Material],
-        model: Model,
+        model: Model | Shell,
         *,
         order: int | None = None,
         temperature: Temperature | None = None,
@@ -82,6 +83,12 @@ class Continuum:
             raise InputError(
                 f"{type(model).__name__} needs a mesh of dimension {model.gdim}, "
                 f"but mesh '{mesh.name}' has dimension {mesh.gdim}"
+            )
+        if model.tdim != mesh.tdim:
+            what = "surface cells in space, which are for Shell()" if mesh.tdim == 2 else "volumes"
+            raise InputError(
+                f"{type(model).__name__} needs cells of dimension {model.tdim}, but mesh "
+                f"'{mesh.name}' has {what}"
             )
         if isinstance(model, Axisymmetric):
             r = mesh.domain.geometry.x[:, 0]
@@ -94,7 +101,7 @@ class Continuum:
                 else None,
             )
         self.mesh = mesh
-        self.model = model
+        self.model: Model = cast(Model, model)  # nobody asks a shell for strains of its position
         self.order = mesh.order if order is None else whole("Scene", "order", order)
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order}: only displacements of order 1 and 2 exist")
@@ -102,9 +109,10 @@ class Continuum:
         collective_garbage.collect(mesh.comm)
         collective_garbage.watch(self, mesh.comm, mesh.domain.comm)
         self.gdim = mesh.gdim
-        self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (self.gdim,)))
+        n = model.n_unknowns
+        self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (n,)))
         n_owned = int(self.space.dofmap.index_map.size_local)
-        self.layout = DofLayout(self.comm, self.gdim, n_owned)
+        self.layout = DofLayout(self.comm, self.gdim, n_owned, n)
         self.x = ufl.SpatialCoordinate(mesh.domain)
         weight = model.weight(self.x)
         self.weight = (
@@ -116,11 +124,30 @@ class Continuum:
         self.temperature: TemperatureField | None = None
         if temperature is not None:
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
+        for material in materials.values() if isinstance(materials, Mapping) else [materials]:
+            self.check_material(material)
         self.part_materials: list[Material] = []
         self.part_cells: list[Ints] = []
         self.shell_cells: dict[int, ShellCells] = {}
         self.parts = self._assign(materials)
         self._form: Any = None
+
+    def check_material(self, material: Any) -> None:
+        """Refuse what is no material of these bodies.
+
+        Raises:
+            InputError: It is a class, has no stiffness, or is the section of a shell.
+        """
+        if isinstance(material, type) or not hasattr(material, "stiffness"):
+            raise InputError(
+                f"materials: {material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
+                "nu=0.3), or one per cell group, {'name': Isotropic(...)}"
+            )
+        if getattr(material, "form", "elastic") == "shell":
+            raise InputError(
+                "materials: a Section belongs to shells; write Scene(..., model=Shell()) on a "
+                "surface mesh, or give the material itself"
+            )
 
     @property
     def n_local(self) -> int:
@@ -261,8 +288,16 @@ class Continuum:
         matrix.assemble()
         return matrix
 
-    def surface(self, where: str) -> Any:
-        """UFL measure of a named facet group."""
+    def surface(self, where: str | Face) -> Any:
+        """UFL measure of a named facet group.
+
+        Raises:
+            InputError: The group is the face of a shell.
+        """
+        if isinstance(where, Face):
+            raise InputError(
+                f"Face '{where}' belongs to shells; solids have facet groups, named by a string"
+            )
         meta = {"quadrature_degree": self.degree}
         facets = self.mesh.group(where, dim=self.mesh.tdim - 1).entities
         marks = dolfinx.mesh.meshtags(
@@ -280,6 +315,12 @@ class Continuum:
             self.mesh.domain, self.mesh.tdim, cells, np.ones(len(cells), dtype=np.int32)
         )
         return ufl.Measure("dx", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
+
+    def displacement(self, q: Any) -> Any:
+        """UFL displacement among the unknowns, a function of or an argument on ``space``."""
+        if self.layout.n_unknowns == self.gdim:
+            return q
+        return ufl.as_vector([q[i] for i in range(self.gdim)])
 
     def field(self, value: Field, title: str) -> Any:
         """A number as a UFL constant, a function of positions interpolated in each cell.

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.continuum.face import Face
 
 
 class DofLayout:
@@ -101,11 +102,11 @@ class DofLayout:
         """Numbers on this rank of global nodes that it owns, shape of the nodes."""
         return np.asarray(nodes - self.first_node)
 
-    def point_maps(self, name: str, nodes: npt.NDArray[np.integer]) -> Array | None:
+    def point_maps(self, name: str | Face, nodes: npt.NDArray[np.integer]) -> Array | None:
         """P at nodes of a named surface: displacement of its points per unknown of their nodes.
 
         Args:
-            name: Facet group.
+            name: Facet group, or face of a shell.
             nodes: Nodes of this rank (owned and ghosts), shape (...,).
 
         Returns:

@@ -23,6 +23,8 @@ from fxcrack.base.errors import InputError
 class _Plane:
     thickness: float = 1.0
     gdim: ClassVar[int] = 2
+    tdim: ClassVar[int] = 2
+    n_unknowns: ClassVar[int] = 2
     labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "xy")
     stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "xy")
 
@@ -83,6 +85,8 @@ class Axisymmetric:
     """
 
     gdim: ClassVar[int] = 2
+    tdim: ClassVar[int] = 2
+    n_unknowns: ClassVar[int] = 2
     labels: ClassVar[tuple[str, ...]] = ("rr", "zz", "tt", "rz")
     stress_labels: ClassVar[tuple[str, ...]] = labels
 
@@ -113,6 +117,8 @@ class Solid:
     """Three-dimensional body."""
 
     gdim: ClassVar[int] = 3
+    tdim: ClassVar[int] = 3
+    n_unknowns: ClassVar[int] = 3
     labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "yz", "xz", "xy")
     stress_labels: ClassVar[tuple[str, ...]] = labels
 
@@ -146,7 +152,37 @@ class Solid:
         return np.ones(len(x))
 
 
+@dataclass(frozen=True)
+class Shell:
+    """Shells on a surface mesh in space, each cell group with its :class:`fxcrack.Section`.
+
+    Unknowns of a node are the displacement u of the reference surface and the change w of the
+    director (the unit normal D): a point at the distance z moves to X + z D + u + z w, exactly and
+    at any rotation. A linear thickness strain is condensed in every cell (seven parameters). Its
+    strains are in :mod:`fxcrack.continuum.shell_strains`.
+
+    Args:
+        enhanced_membrane: Enhance the membrane strains of first-order quadrilaterals by five terms
+            (Simo and Rifai 1990), for webs that bend in their plane.
+    """
+
+    enhanced_membrane: bool = False
+    gdim: ClassVar[int] = 3
+    tdim: ClassVar[int] = 2
+    n_unknowns: ClassVar[int] = 6
+    stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "yz", "xz", "xy")
+
+    def weight(self, x: Any) -> Any:
+        """One: thickness is part of the section."""
+        return 1.0
+
+    def breadth(self, x: Array) -> Array:
+        """One: the faces of a shell have their own width, shape (n,)."""
+        return np.ones(len(x))
+
+
 Model = PlaneStrain | PlaneStress | Axisymmetric | Solid
+"""Models whose strains are functions of the gradient of the displacement."""
 
 
 def green_lagrange(model: Model, u: Any, x: Any) -> Any:

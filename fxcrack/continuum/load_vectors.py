@@ -17,7 +17,18 @@ from petsc4py import PETSc
 
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.loads import BodyForce, Field, Load, PointForce, Pressure, Traction
+from fxcrack.continuum.loads import (
+    BodyForce,
+    Field,
+    Load,
+    Moment,
+    PointForce,
+    PointMoment,
+    Pressure,
+    Traction,
+)
+from fxcrack.continuum.shell_bodies import ShellBodies
+from fxcrack.continuum.shell_forces import shell_load
 from fxcrack.continuum.thermal_strain import ThermalLoad, load_form
 
 
@@ -34,9 +45,15 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
     Raises:
         InputError: The load has the wrong number of components, or its group does not fit.
     """
+    if isinstance(continuum, ShellBodies):
+        vector = shell_load(continuum, load)
+        if vector is not None:
+            return vector
+    if isinstance(load, Moment | PointMoment):
+        raise InputError(f"load '{load.title}': only shells take moments; apply a couple of forces")
     if isinstance(load, PointForce):
         return _point_force(continuum, load.where, load.value, load.title)
-    v = ufl.TestFunction(continuum.space)
+    v = continuum.displacement(ufl.TestFunction(continuum.space))
     if isinstance(load, Traction):
         ds = continuum.surface(load.where)
         form = ufl.inner(_vector(continuum, load.value, load.title), v) * continuum.weight * ds

@@ -24,6 +24,7 @@ from fxcrack.base.checks import (
     text,
 )
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.face import Face
 
 Field = float | Callable[[Array], Array]
 """A number, or a function of positions, shape (3, n), that returns shape (n,)."""
@@ -124,14 +125,17 @@ class Displacement:
 class Traction:
     """Force per area on a named facet group.
 
+    Of shells: force per area on a face (:class:`fxcrack.Face`), or force per length on a group of
+    edges at the border.
+
     Args:
-        where: Name of a facet group.
+        where: Name of a facet group, or a face of a shell.
         value: Components, force/length^2, each a number or a function of position.
         amplitude: Factor in time.
         name: What the history calls it.
     """
 
-    where: str
+    where: str | Face
     value: tuple[Field, ...]
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
@@ -145,7 +149,7 @@ class Traction:
     @property
     def title(self) -> str:
         """Name in the history."""
-        return self.name or self.where
+        return self.name or str(self.where)
 
 
 @dataclass(frozen=True)
@@ -153,7 +157,7 @@ class Pressure:
     """Pressure on a named facet group, positive when it pushes into the body.
 
     Args:
-        where: Name of a facet group.
+        where: Name of a facet group, or a face of a shell (:class:`fxcrack.Face`).
         value: Force/length^2, a number or a function of (undeformed) position.
         amplitude: Factor in time.
         name: What the history calls it.
@@ -161,7 +165,7 @@ class Pressure:
             keeping direction and size.
     """
 
-    where: str
+    where: str | Face
     value: Field
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
@@ -177,7 +181,7 @@ class Pressure:
     @property
     def title(self) -> str:
         """Name in the history."""
-        return self.name or self.where
+        return self.name or str(self.where)
 
 
 @dataclass(frozen=True)
@@ -263,7 +267,53 @@ def _components(owner: str, value: Any, *, functions: bool = True) -> Any:
     return tuple(entries)
 
 
-Load = Traction | Pressure | BodyForce | PointForce
+@dataclass(frozen=True)
+class Moment:
+    """Moment per length on a named group of edges of a shell.
+
+    It does the work of m . (D x w) and acts on the director as the dead couple m x D.
+
+    Args:
+        where: Name of a group of edges at the border.
+        value: Components, force, each a number or a function of position.
+        amplitude: Factor in time.
+        name: What the history calls it.
+    """
+
+    where: str
+    value: tuple[Field, ...]
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.where
+
+
+@dataclass(frozen=True)
+class PointMoment:
+    """A total moment, shared equally by the nodes of a group of a shell.
+
+    Args:
+        where: Name of a group, usually of one node.
+        value: Components, force x length.
+        amplitude: Factor in time.
+        name: What the history calls it.
+    """
+
+    where: str
+    value: tuple[float, ...]
+    amplitude: AmplitudeLike = Ramp()
+    name: str | None = None
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or self.where
+
+
+Load = Traction | Pressure | BodyForce | PointForce | Moment | PointMoment
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ from fxcrack.base.checks import (
 from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.base.positions import as_marks, marks_at, numbers_at
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.face import Face
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface, gather_surface
 
@@ -42,10 +43,10 @@ class Interface:
     """Two facing surfaces, partly bonded; the crack propagates between them.
 
     Args:
-        slave: Facet group of the slave side.
-        master: Facet group of the master side; must extend under every bonded slave node. Where
-            the interface ends inside a body both sides share the nodes of that border, which stay
-            bonded.
+        slave: Facet group of the slave side, or the face of a shell (:class:`fxcrack.Face`).
+        master: Facet group or face of the master side; must extend under every bonded slave node.
+            Where the interface ends inside a body both sides share the nodes of that border, which
+            stay bonded.
         bonded: The initially bonded slave nodes: the name of a group, a function of positions of
             shape (3, n) that returns n booleans, an array of booleans per slave node (in the
             order of ``Pair.surface``), or ``None``: all of them, and no tip exists.
@@ -61,8 +62,8 @@ class Interface:
         name: What the history calls the interface; the slave's name by default.
     """
 
-    slave: str
-    master: str
+    slave: str | Face
+    master: str | Face
     bonded: Bonded = None
     contact: bool = False
     friction: float | Callable[[Array], npt.ArrayLike] | None = None
@@ -124,7 +125,7 @@ class Interface:
     @property
     def title(self) -> str:
         """Name in the history."""
-        return self.name or self.slave
+        return self.name or str(self.slave)
 
 
 @dataclass(frozen=True)

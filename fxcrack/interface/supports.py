@@ -16,8 +16,12 @@ from fxcrack.base.errors import InputError, InterfaceError, raise_on_all_ranks
 from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Displacement
+from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry, rotation_values
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
+
+AnySupport = Displacement | Support
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class SupportColumn:
     """
 
     title: str
-    support: Displacement
+    support: AnySupport
     moves: bool
     scale: float
 
@@ -71,38 +75,86 @@ class Supports:
         return nodes.share(self.which[dofs]), nodes.share(self.value[dofs])
 
 
-def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supports:
+def _prescribed(
+    continuum: Continuum, support: AnySupport, nodes: Ints
+) -> list[tuple[str, Ints, Array]]:
+    """Name, unknown of each node (-1 for none) and value there of what a support prescribes.
+
+    Args:
+        continuum: The bodies.
+        support: The support.
+        nodes: Nodes of its group that this rank owns, shape (n,).
+
+    Raises:
+        InputError: The support does not fit the bodies; collective.
+    """
+    gdim, n = continuum.gdim, len(nodes)
+    x = continuum.positions()[nodes]
+    if isinstance(support, Displacement):
+        out = []
+        for component, field in enumerate((support.x, support.y, support.z)):
+            if field is None:
+                continue
+            if component >= gdim:
+                raise InputError(
+                    f"Displacement('{support.title}') prescribes {'xyz'[component]} in {gdim} "
+                    "dimensions"
+                )
+            axis, value, problem = "xyz"[component], np.zeros(n), None
+            try:
+                if callable(field):
+                    value = numbers_at(f"Displacement('{support.title}')", axis, field, x)
+                else:
+                    value = np.full(n, float(field))
+            except InputError as error:  # on this rank, perhaps
+                problem = str(error)
+            raise_on_all_ranks(continuum.comm, problem)
+            out.append((axis, np.full(n, component), value))
+        return out
+    names = ["xyz"[c] for c in range(gdim)]
+    if isinstance(continuum, ShellBodies):
+        names += ["wx", "wy", "wz"]
+    if isinstance(support, Rotation):
+        if not isinstance(continuum, ShellBodies):
+            raise InputError(
+                f"Rotation('{support.title}'): only shells have rotations; prescribe displacements "
+                "that vary over the thickness"
+            )
+        found: list[tuple[str, Array, Array]] = []
+        fault = None
+        try:
+            found = rotation_values(support, continuum.directors[nodes], x)
+        except InputError as error:
+            fault = str(error)
+        raise_on_all_ranks(continuum.comm, fault)
+        return [(name, np.where(c < 0, -1, gdim + c), value) for name, c, value in found]
+    if isinstance(support, Symmetry):
+        names = [name for name in names if name[-1] == support.axis]
+        if not names:
+            raise InputError(f"Symmetry('{support.title}'): there is no axis {support.axis}")
+    assert isinstance(support, Clamp | Symmetry)
+    number = {"x": 0, "y": 1, "z": 2, "wx": 3, "wy": 4, "wz": 5}
+    return [(name, np.full(n, number[name]), np.zeros(n)) for name in names]
+
+
+def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Supports:
     """Number the prescribed components and place them on the dofs; collective.
 
     Raises:
         InputError: Two supports prescribe different values for one dof, or a value is not finite.
     """
-    gdim, layout = continuum.gdim, continuum.layout
+    layout = continuum.layout
     which = np.full(layout.n_local, -1, dtype=np.int64)
     value = np.zeros(layout.n_local)
     columns: list[SupportColumn] = []
     problem = None
     x = continuum.positions()
     for support in supports:
-        nodes = continuum.owned_nodes(support.where)
-        for axis, field in zip("xyz", (support.x, support.y, support.z), strict=True):
-            if field is None:
-                continue
-            component = "xyz".index(axis)
-            if component >= gdim:
-                raise InputError(
-                    f"Displacement('{support.title}') prescribes {axis} in {gdim} dimensions"
-                )
-            dofs = layout.dof(nodes, component)
-            owner = f"Displacement('{support.title}')"
-            values = np.zeros(len(nodes))
-            try:
-                if callable(field):
-                    values = numbers_at(owner, axis, field, x[nodes])
-                else:
-                    values = np.full(len(nodes), float(field))
-            except InputError as error:  # on this rank, perhaps: said by all ranks below
-                problem = str(error)
+        group = continuum.owned_nodes(support.where).astype(np.int64)
+        owner = f"{type(support).__name__}('{support.title}')"
+        for axis, unknown, wanted in _prescribed(continuum, support, group):
+            nodes, values = group[unknown >= 0], wanted[unknown >= 0]
+            dofs = layout.dof(nodes, unknown[unknown >= 0])
             bad = np.flatnonzero(~np.isfinite(values))
             if len(bad):
                 at = format_point(x[nodes[bad[0]]])
@@ -122,6 +174,11 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
             which[dofs[free]], value[dofs[free]] = len(columns), values[free]
             low = continuum.comm.allreduce(float(values.min(initial=np.inf)), op=MPI.MIN)
             high = continuum.comm.allreduce(float(values.max(initial=-np.inf)), op=MPI.MAX)
+            if low > high:
+                problem = (
+                    f"{owner}: {axis} prescribes nothing, the director of all "
+                    "nodes lies along that axis"
+                )
             moves = low != 0.0 or high != 0.0
             scale = high if moves and low == high else 1.0
             columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale))
@@ -266,6 +323,7 @@ def check_slaves(
                 which[masters], value[masters], supports,
             )  # fmt: skip
             if column is None:
+                _check_points_held(pair, int(node), which[slave[node]], which[masters], supports)
                 continue
             if pair.bonded[node]:
                 raise InterfaceError(
@@ -282,6 +340,38 @@ def check_slaves(
                     format_point(pair.surface.x[node]),
                     column.title,
                 )
+
+
+def _check_points_held(
+    pair: Pair, node: int, which: Ints, master_which: Ints, supports: Supports
+) -> None:
+    """Refuse a bonded node whose nodes are held, but not the points of both faces.
+
+    Args:
+        pair: The interface.
+        node: Slave node, held like its masters.
+        which: Support columns of its unknowns, -1 if free, shape (n_unknowns,).
+        master_which: Those of its masters, shape (k, n_unknowns).
+        supports: The columns.
+
+    Raises:
+        InterfaceError: Its further unknowns (change of a director) are not held.
+    """
+    maps, on_master = pair.surface.point_maps, pair.master_maps
+    if maps is None or on_master is None or not pair.bonded[node]:
+        return
+    gdim = maps.shape[1]
+    for c in np.flatnonzero(which[:gdim] >= 0):
+        moved = np.flatnonzero(maps[node, c] != 0.0)
+        below = np.flatnonzero((on_master[node, :, c] != 0.0).any(axis=0))
+        if np.all(which[moved] >= 0) and np.all(master_which[:, below] >= 0):
+            continue
+        raise InterfaceError(
+            f"support '{supports.columns[int(which[c])].title}' holds the reference surface at "
+            f"the bonded node at {format_point(pair.surface.x[node])} of interface "
+            f"'{pair.title}', but not the director that moves its face; hold both by Symmetry or "
+            "Clamp, or end the support before the bonded part"
+        )
 
 
 def _unshared_support(

@@ -18,6 +18,8 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InterfaceError, raise_on_all_ranks
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.face import Face
+from fxcrack.continuum.shell_bodies import ShellBodies
 
 _FLAT = 1e-10
 """Facets smaller than this fraction of the others have no length."""
@@ -214,19 +216,100 @@ def facet_nodes(
     return kind, cells, local, nodes
 
 
-def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
-    """Collect a facet group on every rank; collective.
+@dataclass(frozen=True)
+class _Facets:
+    """Facets of a surface on this rank, those it alone gives.
+
+    Attributes:
+        kind: Facet cell.
+        key: Place of the cell of each facet in the input, shape (n_facets,).
+        which: Number of the facet in its cell, shape (n_facets,).
+        nodes: Displacement nodes of this rank, shape (n_facets, nodes_per_facet).
+        x: Their positions on the surface, shape (n_facets, nodes_per_facet, 3).
+        inner: A point behind each facet, shape (n_facets, 3).
+        outward: As in :class:`FacetSurface`, shape (n_facets,); ``None`` to find it.
+    """
+
+    kind: str
+    key: Ints
+    which: Ints
+    nodes: Ints
+    x: Array
+    inner: Array
+    outward: Array | None = None
+
+
+def gather_surface(continuum: Continuum, name: str | Face) -> FacetSurface:
+    """Collect a facet group, or the face of a shell, on every rank; collective.
 
     Args:
         continuum: Displacement space.
-        name: Facet group.
+        name: Facet group, or face of a shell.
 
     Returns:
         The surface, the same on every rank.
 
     Raises:
-        InterfaceError: The group is empty or some of its facets lie inside the body.
+        InterfaceError: The group is empty, some of its facets lie inside the body, or the
+            surface does not fit the bodies.
     """
+    if isinstance(continuum, ShellBodies):
+        mine = _face_facets(continuum, name)
+    elif isinstance(name, Face):
+        raise InterfaceError(
+            f"Face '{name}' belongs to shells, and this scene has solids; name a facet group. A "
+            "mesh has cells of one shape, so shells and solids cannot be bonded to each other: "
+            "model thin parts beside solids with ContinuumShell"
+        )
+    else:
+        mine = _group_facets(continuum, name)
+    index_map = continuum.space.dofmap.index_map
+    blocks = np.asarray(index_map.local_to_global(mine.nodes.ravel()), dtype=np.int64)
+    send = [mine.key, mine.which, blocks.reshape(mine.nodes.shape), mine.x, mine.inner]
+    has_outward = mine.outward is not None
+    if mine.outward is not None:
+        send.append(mine.outward)
+    maps = continuum.layout.point_maps(name, mine.nodes)
+    if maps is not None:
+        send.append(maps)
+    parts = [p for p in continuum.comm.allgather(send) if len(p[0])]
+    if not parts:
+        raise InterfaceError(f"facet group '{name}' of mesh '{continuum.mesh.name}' is empty")
+    key, which, blocks, points, inner, *others = (
+        np.concatenate(c) for c in zip(*parts, strict=True)
+    )
+    order = np.lexsort((which, key))
+    blocks, points, inner = blocks[order], points[order], inner[order]
+    outward = others.pop(0)[order] if has_outward else None
+    unique, first, inverse = np.unique(blocks.ravel(), return_index=True, return_inverse=True)
+    rank = np.argsort(np.argsort(first))
+    position = np.empty((len(unique), 3))
+    position[rank] = points.reshape(-1, 3)[first]
+    node_dofs = np.empty(len(unique), dtype=np.int64)
+    node_dofs[rank] = unique
+    point_maps = None
+    for found in others:
+        by_corner = found[order].reshape(-1, *found.shape[2:])
+        point_maps = np.empty((len(unique), *found.shape[2:]))
+        point_maps[rank] = by_corner[first]
+    surface = FacetSurface(
+        name=str(name),
+        kind=mine.kind,
+        order=continuum.order,
+        dofs=node_dofs,
+        x=position,
+        facets=rank[inverse].reshape(blocks.shape),
+        inner=inner,
+        breadth=continuum.model.breadth(position),
+        outward=outward,
+        point_maps=point_maps,
+    )
+    _check_facets(surface)
+    return surface
+
+
+def _group_facets(continuum: Continuum, name: str) -> _Facets:
+    """Facets of a named group at cells that this rank owns; collective."""
     domain, tdim = continuum.mesh.domain, continuum.mesh.tdim
     facets = continuum.mesh.group(name, dim=tdim - 1).entities
     kind, cells, local, nodes = facet_nodes(continuum, facets)
@@ -238,53 +321,41 @@ def gather_surface(continuum: Continuum, name: str) -> FacetSurface:
             "boundaries: mesh the two sides apart, or split the mesh there (fxcrack.Split)"
         )
     raise_on_all_ranks(continuum.comm, problem, InterfaceError)
-
     here = cells < domain.topology.index_map(tdim).size_local
     cells, local, nodes = cells[here], local[here], nodes[here]
-    index_map = continuum.space.dofmap.index_map
-    blocks = np.asarray(index_map.local_to_global(nodes.ravel()), dtype=np.int64)
-    mine = [
+    return _Facets(
+        kind,
         np.asarray(compat.original_cell_index(domain), dtype=np.int64)[cells],
         local,
-        blocks.reshape(nodes.shape),
+        nodes,
         continuum.positions()[nodes],
         domain.geometry.x[compat.geometry_dofmap(domain)[cells]].mean(axis=1),
-    ]
-    maps = continuum.layout.point_maps(name, nodes)
-    if maps is not None:
-        mine.append(maps)
-    parts = [p for p in continuum.comm.allgather(mine) if len(p[0])]
-    if not parts:
-        raise InterfaceError(f"facet group '{name}' of mesh '{continuum.mesh.name}' is empty")
-    key, which, blocks, points, inner, *maps_of = (
-        np.concatenate(c) for c in zip(*parts, strict=True)
     )
-    order = np.lexsort((which, key))
-    blocks, points, inner = blocks[order], points[order], inner[order]
-    unique, first, inverse = np.unique(blocks.ravel(), return_index=True, return_inverse=True)
-    rank = np.argsort(np.argsort(first))
-    position = np.empty((len(unique), 3))
-    position[rank] = points.reshape(-1, 3)[first]
-    node_dofs = np.empty(len(unique), dtype=np.int64)
-    node_dofs[rank] = unique
-    point_maps = None
-    for found in maps_of:
-        by_corner = found[order].reshape(-1, *found.shape[2:])
-        point_maps = np.empty((len(unique), *found.shape[2:]))
-        point_maps[rank] = by_corner[first]
-    surface = FacetSurface(
-        name=name,
-        kind=kind,
-        order=continuum.order,
-        dofs=node_dofs,
-        x=position,
-        facets=rank[inverse].reshape(blocks.shape),
-        inner=inner,
-        breadth=continuum.model.breadth(position),
-        point_maps=point_maps,
+
+
+def _face_facets(shell: ShellBodies, face: str | Face) -> _Facets:
+    """Cells of a shell that this rank owns as facets at X + z D; collective."""
+    if not isinstance(face, Face):
+        raise InterfaceError(
+            f"interface side '{face}' of a shell: name a face, Face('{face}', 'top') or 'bottom', "
+            "where it is a group of cells; edges are no sides of an interface"
+        )
+    domain = shell.mesh.domain
+    cells = shell.mesh.group(face.group, dim=2).entities
+    cells = cells[cells < domain.topology.index_map(2).size_local]
+    nodes = shell.space.dofmap.list[cells]
+    z = shell.height(face)
+    reference = shell.positions()[nodes]
+    side = 1.0 if face.side == "top" else -1.0
+    return _Facets(
+        domain.topology.cell_name(),
+        np.asarray(compat.original_cell_index(domain), dtype=np.int64)[cells],
+        np.zeros(len(cells), dtype=np.int64),
+        nodes,
+        reference + z * shell.directors[nodes],
+        reference.mean(axis=1),
+        side * shell.signs[cells],
     )
-    _check_facets(surface)
-    return surface
 
 
 def _check_facets(surface: FacetSurface) -> None:

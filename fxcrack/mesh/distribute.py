@@ -24,11 +24,13 @@ def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
     Raises:
         MeshError: A group holds entities that are not facets, edges or nodes of the cells.
     """
-    shape = None if raw is None else (raw.cell, raw.order, raw.tdim, raw.n_entity_nodes(raw.tdim))
-    cell, order, tdim, width = comm.bcast(shape)
-    points = np.empty((0, tdim)) if raw is None else raw.points
+    shape = None
+    if raw is not None:
+        shape = (raw.cell, raw.order, raw.tdim, raw.gdim, raw.n_entity_nodes(raw.tdim))
+    cell, order, tdim, gdim, width = comm.bcast(shape)
+    points = np.empty((0, gdim)) if raw is None else raw.points
     cells = np.empty((0, width), dtype=np.int64) if raw is None else raw.cells
-    element = compat.coordinate_element(cell, order, tdim)
+    element = compat.coordinate_element(cell, order, gdim)
     domain = compat.create_mesh(comm, cells, points, element)
 
     groups = {n: Group(tdim, c) for n, c in _cell_groups(raw, domain).items()}

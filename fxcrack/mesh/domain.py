@@ -97,7 +97,7 @@ def _headed(name: str, problem: str | None) -> str | None:
 def _geometry_fault(domain: dolfinx.mesh.Mesh) -> str | None:
     """What is wrong with the nodes and cells of this rank."""
     geometry, cells = domain.geometry, compat.geometry_dofmap(domain)
-    if geometry.dim != domain.topology.dim or not len(cells):
+    if not len(cells):
         return None
     cell, order = domain.topology.cell_name(), int(compat.coordinate_map(domain).degree)
     raw = RawMesh(cell, order, geometry.x[:, : geometry.dim], np.asarray(cells, np.int64))

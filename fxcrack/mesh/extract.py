@@ -37,17 +37,18 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
 
     Args:
         model: ``gmsh.model``, meshed.
-        gdim: Geometric dimension the caller expects, ``None`` for any.
+        gdim: Geometric dimension, 3 for surface cells in space; ``None`` for that of the cells.
 
     Raises:
         MeshError: No cells or unsupported ones, a plane mesh out of z = 0, unusable groups.
     """
     cell, order, tdim, tags, cells, incomplete = _cells(model)
-    if gdim is not None and gdim != tdim:
+    if gdim is not None and gdim not in (tdim, 3):
         raise MeshError(
             f"the cells are {tdim}-dimensional, but gdim={gdim} was asked for; leave gdim out, or "
-            f"mesh {'a volume' if gdim == 3 else 'only surfaces in the plane z = 0'}"
+            "mesh only surfaces in the plane z = 0"
         )
+    gdim = tdim if gdim is None else gdim
     node_tags, coordinates, _ = model.mesh.getNodes()
     by_tag = np.argsort(node_tags)
     node_tags = node_tags[by_tag].astype(np.int64)
@@ -59,9 +60,9 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
     completion = Completion(cell, points, nodes) if incomplete else None
     if completion is not None:
         points, nodes = completion.points, completion.nodes
-    _check_plane(points, tdim)
+    _check_plane(points, gdim)
     nodes = nodes[:, compat.gmsh_cell_permutation(getattr(CellType, cell), nodes.shape[1])]
-    raw = RawMesh(cell, order, np.ascontiguousarray(points[:, :tdim]), nodes)
+    raw = RawMesh(cell, order, np.ascontiguousarray(points[:, :gdim]), nodes)
 
     # MSH 2 files repeat a cell for every physical group that holds it.
     kept, position = distinct(nodes, raw.n_vertices(tdim))
@@ -123,17 +124,17 @@ def _cells(model: Any) -> tuple[str, int, int, Ints, Ints, bool]:
     return cell, order, tdim, tags.astype(np.int64), nodes.astype(np.int64), incomplete
 
 
-def _check_plane(points: Floats, tdim: int) -> None:
-    """Refuse a mesh of surface cells that leaves the plane z = 0."""
-    if tdim == 3:
+def _check_plane(points: Floats, gdim: int) -> None:
+    """Refuse a plane mesh that leaves the plane z = 0."""
+    if gdim == 3:
         return
     size = np.ptp(points[:, :2], axis=0).max()
     off = np.flatnonzero(np.abs(points[:, 2]) > _PLANE * size)
     if len(off):
         raise MeshError(
             f"surface cells must lie in the plane z = 0, but {len(off)} of {len(points)} nodes do "
-            f"not, the first at {format_point(points[off[0]])}; move the model there, or mesh the "
-            "volume for a 3-D analysis"
+            f"not, the first at {format_point(points[off[0]])}; move the model there, mesh the "
+            "volume for a 3-D analysis, or give gdim=3 for shells"
         )
 
 

@@ -64,7 +64,12 @@ class RawMesh:
 
     @property
     def tdim(self) -> int:
-        """Topological dimension of the cells, which is also the geometric one."""
+        """Topological dimension of the cells."""
+        return len(basix.topology(basix.CellType[self.cell])) - 1
+
+    @property
+    def gdim(self) -> int:
+        """Geometric dimension; larger than that of the cells in a surface mesh."""
         return int(self.points.shape[1])
 
     @property
@@ -129,7 +134,8 @@ def check_shapes(raw: RawMesh) -> None:
     """Refuse coordinates that are not numbers and cells without volume or folded over.
 
     The Jacobian determinant of the geometry must keep its sign over the quadrature points of a
-    cell and stay above round-off. A negative sign alone is no fault: DOLFINx uses |det J|.
+    cell and stay above round-off. A negative sign alone is no fault: DOLFINx uses |det J|. On a
+    surface in space it is the area, with the sign of the normal against that of the first point.
 
     Raises:
         MeshError: Says how many cells are degenerate and where the first one is.
@@ -146,7 +152,7 @@ def check_shapes(raw: RawMesh) -> None:
     for start in range(0, len(raw.cells), _CHUNK):
         x = raw.points[raw.cells[start : start + _CHUNK]]
         jacobians = np.tensordot(x, gradients, axes=(1, 2)).transpose(0, 3, 1, 2)
-        det = np.linalg.det(jacobians)
+        det = _determinant(jacobians)
         det *= np.sign(det[:, :1])
         flat = _FLAT * np.linalg.norm(jacobians, axis=(2, 3)).max(axis=1) ** raw.tdim
         bad.append(start + np.flatnonzero(~(det.min(axis=1) > flat)))
@@ -158,6 +164,19 @@ def check_shapes(raw: RawMesh) -> None:
             f"the first at {format_point(centre)}; mend the geometry there or change the "
             "element size"
         )
+
+
+def _determinant(jacobians: Floats) -> Floats:
+    """Signed volume or area per reference cell, shape (n_cells, n_points).
+
+    Args:
+        jacobians: shape (n_cells, n_points, gdim, tdim).
+    """
+    if jacobians.shape[-1] == jacobians.shape[-2]:
+        return np.asarray(np.linalg.det(jacobians))
+    normal = np.cross(jacobians[..., 0], jacobians[..., 1])
+    area = np.linalg.norm(normal, axis=-1)
+    return area * np.where(np.einsum("cpx,cx->cp", normal, normal[:, 0]) < 0.0, -1.0, 1.0)
 
 
 def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:

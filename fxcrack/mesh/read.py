@@ -33,7 +33,8 @@ def read_mesh(
     Args:
         path: The file, of any .msh version gmsh reads; opened on rank 0 only.
         comm: Communicator to distribute the mesh over.
-        gdim: Geometric dimension; ``None`` takes that of the cells.
+        gdim: Geometric dimension; ``None`` takes that of the cells, 3 keeps surface cells in space
+            (the reference surface of shells).
         split: Internal surfaces to split into slave and master sides, in this order.
 
     Returns:
@@ -78,7 +79,8 @@ def mesh_from_gmsh(
     Args:
         model: ``gmsh.model`` on rank 0; what the other ranks pass is not looked at.
         comm: Communicator to distribute the mesh over.
-        gdim: Geometric dimension; ``None`` takes that of the cells.
+        gdim: Geometric dimension; ``None`` takes that of the cells, 3 keeps surface cells in space
+            (the reference surface of shells).
         split: Internal surfaces to split into slave and master sides, in this order.
         name: What messages and files call the mesh.
 
@@ -129,7 +131,7 @@ def prepare(model: Any, name: str, gdim: int | None = None, split: Sequence[Spli
     Args:
         model: ``gmsh.model``, meshed.
         name: What messages call the mesh.
-        gdim: Geometric dimension the caller expects, ``None`` for any.
+        gdim: Geometric dimension, 3 for surface cells in space; ``None`` for that of the cells.
         split: Internal surfaces to split, in this order.
 
     Raises:
@@ -138,6 +140,11 @@ def prepare(model: Any, name: str, gdim: int | None = None, split: Sequence[Spli
     try:
         raw = extract(model, gdim)
         check_shapes(raw)
+        if split and raw.gdim != raw.tdim:
+            raise MeshError(
+                "a surface mesh in space has no internal surfaces to split; mesh the two shells of "
+                "an interface apart, each with its own nodes, and leave split out"
+            )
         for one in split:
             raw = split_surface(raw, one)
     except MeshError as error:

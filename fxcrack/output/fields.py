@@ -17,10 +17,12 @@ from fxcrack.base.checks import whole
 from fxcrack.base.errors import InputError
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.stress import cell_stress, von_mises
 from fxcrack.history import Row
 from fxcrack.interface.pairing import Pair
 from fxcrack.output.interface_fields import InterfaceFields, in_space, interface_fields
+from fxcrack.output.shell_fields import shell_grid
 from fxcrack.output.vtu import FACETS, Grid, write_grid, write_header, write_series
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
@@ -61,12 +63,19 @@ def stress_function(source: Analysis | HasAnalysis, u: fem.Function, time: float
     return cell_stress(continuum, u)
 
 
+def has_finite_bodies(analysis: Analysis) -> bool:
+    """Whether the bodies of an analysis turn and stretch by any amount."""
+    return isinstance(analysis.solver, NewtonSolver) and analysis.solver.bodies.finite
+
+
 # -- grids -----------------------------------------------------------------------------------------
 
 
 def body_grid(analysis: Analysis, u: fem.Function, time: float) -> Grid:
     """This rank's cells with displacement, stress and von Mises stress; collective."""
     continuum = analysis.continuum
+    if isinstance(continuum, ShellBodies):
+        return shell_grid(continuum, u, finite=has_finite_bodies(analysis))
     stress = stress_function(analysis, u, time)
     equivalent = von_mises(continuum, stress)
     topology, kinds, x = dolfinx.plot.vtk_mesh(continuum.space)

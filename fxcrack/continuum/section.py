@@ -1,0 +1,139 @@
+"""Sections of shells: what lies above and below the reference surface.
+
+    (N, M) = [A B; B D] (e0, e1),    A, B, D = int (1, z, z^2) C dz
+
+with the 6 x 6 stiffness C of each ply in the axes of the section: 1 along ``axis`` in the tangent
+plane, 3 along the normal, 2 = 3 x 1. Voigt order 11, 22, 33, 23, 13, 12, engineering shears.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import positive
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.laminate import Laminate, Ply
+
+
+@dataclass(frozen=True)
+class Section:
+    """Material of a shell over its thickness.
+
+    Args:
+        material: A laminate, or one elastic material whose axes x, y, z are those of the section.
+        thickness: Of the shell, length; that of the plies of a laminate.
+        axis: Direction of axis 1, projected on the tangent plane.
+        offset: Coordinate z of the middle of the thickness from the reference surface (the mesh)
+            along the normal, length: thickness/2 puts the mesh on the bottom.
+        up: Direction in which the normal is to point, for instance (0, 0, 1); by default to the
+            side from which the nodes of the group's first cell are seen counter-clockwise, and the
+            same side of all cells connected with it.
+        shear_factor: Of transverse shear, a number, or two of 13 and 23; by default from
+            equilibrium (:meth:`fxcrack.Laminate.shear_factors`), 5/6 for one layer.
+
+    Attributes:
+        laminate: The plies, in the axes of the section.
+
+    Raises:
+        InputError: A number is out of range, or the material is none a section may have.
+    """
+
+    material: Any
+    thickness: float | None = None
+    axis: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    offset: float = 0.0
+    up: tuple[float, float, float] | None = None
+    shear_factor: float | tuple[float, float] | None = None
+    form: ClassVar[str] = "shell"
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        if isinstance(self.material, Laminate):
+            if self.thickness is not None:
+                raise InputError(
+                    "Section: the plies of a laminate have the thickness; leave it out"
+                )
+        elif isinstance(self.material, type) or not hasattr(self.material, "stiffness"):
+            raise InputError(
+                f"Section: {self.material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
+                "nu=0.3), or a Laminate"
+            )
+        elif self.thickness is None:
+            raise InputError("Section: a section of one material needs thickness=...")
+        else:
+            positive("Section", thickness=self.thickness)
+        _ = self.laminate  # refuses materials that are not linear elastic
+        if not np.isfinite(self.offset):
+            raise InputError(f"Section: offset = {self.offset} must be finite")
+        for name in ("axis", "up"):
+            value = getattr(self, name)
+            if value is not None and not (
+                np.shape(value) == (3,) and np.all(np.isfinite(value)) and np.any(value)
+            ):
+                raise InputError(
+                    f"Section: {name} = {value!r} must be a direction, three numbers of which "
+                    "one is not zero"
+                )
+        factor = self.shear_factor
+        if factor is not None and not (
+            np.shape(factor) in ((), (2,)) and np.all(np.asarray(factor) > 0.0)
+        ):
+            raise InputError(
+                f"Section: shear_factor = {factor} must be a positive number, or two of them"
+            )
+
+    @property
+    def laminate(self) -> Laminate:
+        """The plies, in the axes of the section."""
+        if isinstance(self.material, Laminate):
+            return self.material
+        assert self.thickness is not None
+        return Laminate([Ply(self.thickness, 0.0, self.material)])
+
+    @property
+    def height(self) -> float:
+        """Thickness of all plies together, length."""
+        return self.laminate.thickness
+
+    def face(self, side: str) -> float:
+        """Coordinate z of the face "top" or "bottom", length."""
+        return self.offset + (0.5 if side == "top" else -0.5) * self.height
+
+    def shear_factors(self) -> tuple[float, float]:
+        """Factors of the transverse shears 13 and 23."""
+        if self.shear_factor is None:
+            return self.laminate.shear_factors()
+        k13, k23 = np.broadcast_to(np.asarray(self.shear_factor, dtype=float), 2).tolist()
+        return k13, k23
+
+    def stiffness(self) -> Array:
+        """[A B; B D] with the shear factors, shape (12, 12); force/length and what follows."""
+        factor = np.ones(6)
+        factor[3], factor[4] = np.sqrt(self.shear_factors()[::-1])
+        a, b, d = self.laminate.moments(2, self.offset) * np.outer(factor, factor)
+        return np.block([[a, b], [b, d]])
+
+    def mass(self) -> Array | None:
+        """Moments of the density, int rho (1, z, z^2) dz.
+
+        Shape (3,); ``None`` where a density is missing.
+        """
+        plies = self.laminate.plies
+        densities = [getattr(p.material, "density", None) for p in plies]
+        if any(d is None for d in densities):
+            return None
+        z = self.laminate.interfaces(self.offset)
+        rho = np.array(densities, dtype=float)
+        return np.array([float(rho @ np.diff(z**n)) / n for n in (1, 2, 3)])
+
+    def thermal_forces(self) -> Array:
+        """Thermal stress resultants (N, M) of a temperature rise of 1 and of z, shape (2, 12)."""
+        first, second, third = self.laminate.thermal_moments(2, self.offset)
+        return np.stack([np.append(first, second), np.append(second, third)])
+
+
+__all__ = ["Section"]
