@@ -76,7 +76,8 @@ class Interface:
     def __post_init__(self) -> None:
         """Refuse contradictions that need no mesh."""
         for name, value in (("slave", self.slave), ("master", self.master)):
-            text("Interface", name, value)
+            if not isinstance(value, Face):
+                text("Interface", name, value)
         text("Interface", "name", self.name, optional=True)
         if self.slave == self.master:
             raise InterfaceError(
