@@ -61,6 +61,7 @@ from fxcrack.scene import Debond, Scene
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.end_conditions import CrackLength, Releases, Time
+from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.static import Dynamic, Static
 
 if TYPE_CHECKING:
@@ -119,6 +120,7 @@ __all__ = [
     "Dynamic",
     "EnhancedVCCT",
     "Evaluator",
+    "Explicit",
     "Fatigue",
     "FieldSeries",
     "FiniteStrain",

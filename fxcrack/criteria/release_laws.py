@@ -79,6 +79,11 @@ class ReleaseLaw(Protocol):
         """Increment suggested for the first one after debonding [time]; inf: none."""
         return float("inf")
 
+    @property
+    def onset(self) -> float:
+        """Value of f at which a node is released in explicit dynamics."""
+        return 1.0
+
     def spent(self, rate: Array, critical: Array) -> Array:
         """Energy per area dissipated by bonds whose force falls with opening, shape (n,).
 
@@ -156,9 +161,26 @@ class ProgressiveRelease(ReleaseLaw):
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
     the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A/|F0|.
+
+    Attributes:
+        zone: Elements over which a bond softens, 1 or 2. With 2 softening begins at f = 1/2 and
+            spends the same energy, which leaves a fast crack (above a third of the Rayleigh speed)
+            less energy to lose to waves of mesh length; explicit dynamics only.
     """
 
+    zone: int = 1
+
     driver: ClassVar[Driver] = "opening"
+
+    def __post_init__(self) -> None:
+        """Check the zone."""
+        if self.zone not in (1, 2):
+            raise InputError(f"ProgressiveRelease: zone = {self.zone!r}: choose 1 or 2 elements")
+
+    @property
+    def onset(self) -> float:
+        """Value of f at which softening begins."""
+        return 1.0 / self.zone
 
     def remaining(self, progress: npt.ArrayLike) -> Array:
         """Remaining fraction.

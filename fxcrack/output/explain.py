@@ -73,7 +73,7 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
     counts = {"form terms": 1, "factorisations": solver.timings.factorizations}
     costs: dict[str, float] = {}
     if analysis.started:
-        system = solver.system
+        system = analysis.condensed.system
         unknowns["retained jumps"] = system.n_retained
         for kind, number in (
             ("contact nodes", int(system.contact.sum())),
@@ -82,7 +82,7 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
         ):
             if number:
                 unknowns[kind] = number
-        costs = {k: v for k, v in solver.law_seconds.items() if k in INTERFACE_LAWS}
+        costs = {k: v for k, v in analysis.condensed.law_seconds.items() if k in INTERFACE_LAWS}
     if isinstance(solver, NewtonSolver):
         bodies = solver.bodies
         kept = sum(np.size(v) for term in bodies.terms for v in term.state().values())

@@ -17,6 +17,7 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Time, Until, conditions
+from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.static import Static
 
 
@@ -142,7 +143,7 @@ class Cycles:
             )
 
 
-def check_criteria(step: Static | Cycles, debonds: Sequence[Debond]) -> None:
+def check_criteria(step: Static | Cycles | Explicit, debonds: Sequence[Debond]) -> None:
     """Fatigue grows in cycles, everything else outside them.
 
     Args:

@@ -122,7 +122,7 @@ def step_by_opening(driver: StepDriver) -> str:
     """Find a proportional load from an opening that never falls; returns why the step ended."""
     analysis = driver.analysis
     _check_proportional(driver)
-    control = OpeningControl(analysis.solver, analysis.active, driver.step.monitors)
+    control = OpeningControl(analysis.condensed, analysis.active, driver.step.monitors)
     while True:
         driver.checkpoint_point()
         reason = driver.ended()
@@ -190,7 +190,7 @@ def _only_round_off(driver: StepDriver) -> bool:
     energy release rate) that of the last release would bring their f, which is round-off, to 1.
     """
     analysis = driver.analysis
-    if driver.breaks or analysis.solver.system.soft.bonds or analysis.time <= 0.0:
+    if driver.breaks or analysis.condensed.system.soft.bonds or analysis.time <= 0.0:
         return False
     by_load = all(g.criterion.depends_on_load for g in analysis.active)
     released = any(g.n_released for g in analysis.active)
