@@ -79,11 +79,6 @@ class ReleaseLaw(Protocol):
         """Increment suggested for the first one after debonding [time]; inf: none."""
         return float("inf")
 
-    @property
-    def onset(self) -> float:
-        """Value of f at which a node is released in explicit dynamics."""
-        return 1.0
-
     def spent(self, rate: Array, critical: Array) -> Array:
         """Energy per area dissipated by bonds whose force falls with opening, shape (n,).
 

@@ -421,7 +421,7 @@ class ExplicitSolver:
 
     def _sum(self, *parts: float) -> list[float]:
         """Sums over ranks; collective."""
-        values = np.array(parts)
+        values = np.array(parts, dtype=float)  # bincount of nothing gives integers
         if self.comm.size > 1:
             self.comm.Allreduce(MPI.IN_PLACE, values)
         return [float(x) for x in values]

@@ -66,7 +66,7 @@ class ReleaseControl:
     def __init__(self, solver: ExplicitSolver, crack: Crack) -> None:
         self._solver, self._crack = solver, crack
         self.law = law_of(crack.debond)
-        self.onset = self.law.onset
+        self.onset = self.law.onset if isinstance(self.law, ProgressiveRelease) else 1.0
         self._screen: _Screen | None = None
 
     def tips(self) -> Tips:

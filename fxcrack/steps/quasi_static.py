@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.errors import InputError, unknown_name
+from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
@@ -53,6 +54,11 @@ def _check_releases(analysis: Analysis, step: Static) -> None:
     """Refuse releases over increments where the stepping has none."""
     for g in analysis.active:
         viscosity, law = g.criterion.viscosity, g.debond.release
+        if isinstance(law, ProgressiveRelease) and law.zone != 1:
+            raise InputError(
+                f"interface '{g.title}': ProgressiveRelease(zone={law.zone}) is for fast cracks in "
+                "explicit dynamics; use zone=1"
+            )
         over_increments = law.driver == "increments"
         if over_increments and step.stepping != "increment":
             raise InputError(
