@@ -69,6 +69,7 @@ from fxcrack.scene import Debond, Scene
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.end_conditions import CrackLength, Releases, Time
+from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.static import Dynamic, Static
 
 if TYPE_CHECKING:
@@ -130,6 +131,7 @@ __all__ = [
     "EnergyError",
     "EnhancedVCCT",
     "Evaluator",
+    "Explicit",
     "Face",
     "Fatigue",
     "FieldSeries",

@@ -61,7 +61,8 @@ from fxcrack.mesh import Mesh
 from fxcrack.output.explain import Explanation, explain
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
-from fxcrack.solvers.base import Solver
+from fxcrack.solvers.base import AnySolver, Solver
+from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.solvers.options import NewtonOptions
@@ -73,6 +74,10 @@ from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import CrackLength, Time
 from fxcrack.steps.energy_check import check_energy
+from fxcrack.steps.explicit import Explicit
+from fxcrack.steps.explicit_driver import run_explicit
+from fxcrack.steps.explicit_rules import check_interfaces, warn_of_step_release
+from fxcrack.steps.explicit_setup import prepare_explicit, start_from, use_explicit_solver
 from fxcrack.steps.progress import Progress
 from fxcrack.steps.quasi_static import run_static
 from fxcrack.steps.rows import Observer
@@ -275,7 +280,7 @@ class Scene:
         return self.solver.loads
 
     @property
-    def solver(self) -> Solver:
+    def solver(self) -> AnySolver:
         """The solver with its present equilibrium."""
         return self.analysis.solver
 
@@ -309,7 +314,7 @@ class Scene:
 
     def run(
         self,
-        step: Static | Cycles,
+        step: Static | Cycles | Explicit,
         *,
         grow: Sequence[Debond] | None = None,
         progress: bool = True,
@@ -353,9 +358,11 @@ class Scene:
             check_instance("run", "checkpoint", checkpoint, Checkpoint, example)
         if save is not None:
             check_instance("run", "save", save, (str, Path), "'history.csv'")
-        check_instance("run", "step", step, (Static, Cycles), "Static(until=Time(1.0))")
+        check_instance("run", "step", step, (Static, Cycles, Explicit), "Static(until=Time(1.0))")
         chosen = self.debonds if grow is None else check_list("run", "grow", grow, Debond)
         self._check_step(step, chosen)
+        if isinstance(step, Explicit):
+            self._use_explicit(step, chosen, accuracy)
         analysis = self.analysis
         may_grow = [d in chosen for d in self.debonds]
         may_grow += [False] * (len(self.pairs) - len(self.debonds))
@@ -371,11 +378,11 @@ class Scene:
         )
         self.history.details = self._details()
         check_energy(self.history, first)
-        if accuracy is not None:
+        if accuracy is not None and not isinstance(step, Explicit):
             self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
         return self.history
 
-    def _check_step(self, step: Static | Cycles, chosen: Sequence[Debond]) -> None:
+    def _check_step(self, step: Static | Cycles | Explicit, chosen: Sequence[Debond]) -> None:
         """Refuse steps that the scene cannot run."""
         for debond in chosen:
             if debond not in self.debonds:
@@ -389,7 +396,14 @@ class Scene:
                     "a later end"
                 )
         check_criteria(step, chosen)
+        if isinstance(step, Explicit):
+            return
         effects, why = self.analysis.effects, self.analysis.plan.why
+        if isinstance(self.solver, ExplicitSolver):
+            raise InputError(
+                f"{type(step).__name__}: this scene has moved by explicit dynamics, and other "
+                "steps cannot follow; make another scene for them, scene.rebuilt()"
+            )
         if isinstance(step, Dynamic) and not any(isinstance(e, Inertia) for e in effects):
             raise InputError(
                 "Dynamic moves bodies that have inertia, and the scene has none; write "
@@ -402,10 +416,16 @@ class Scene:
             )
 
     def _prepare(
-        self, restarts: RestartManager, may_grow: list[bool], step: Static | Cycles
+        self, restarts: RestartManager, may_grow: list[bool], step: Static | Cycles | Explicit
     ) -> None:
         """Condense around the present fronts and find the equilibrium to begin with."""
-        analysis, solver = self.analysis, self.solver
+        analysis = self.analysis
+        if isinstance(step, Explicit):
+            prepare_explicit(analysis, step, may_grow, resumes=restarts.resumes)
+            if restarts.resumes:
+                restarts.put_in_equilibrium()
+            return
+        solver = analysis.condensed
         solver.prepare(may_grow, self._reach(step))
         if restarts.resumes:
             restarts.put_in_equilibrium()
@@ -416,9 +436,33 @@ class Scene:
             analysis.book_start()
         analysis.started = True
 
+    def _use_explicit(
+        self, step: Explicit, chosen: Sequence[Debond], accuracy: float | None
+    ) -> None:
+        """Let the scene move by explicit dynamics; collective."""
+        if accuracy is not None:
+            raise InputError(
+                "accuracy is estimated from a quasi-static solution, which Explicit does not have; "
+                "leave accuracy out, and compare with a finer mesh"
+            )
+        given = self.input
+        check_interfaces(chosen, given.bonds)
+        others = [e for e in given.effects if not isinstance(e, Inertia)]
+        begins = not isinstance(self.solver, ExplicitSolver)
+        use_explicit_solver(
+            self.analysis, given.loads, lambda c: form_terms(c, others, given.loads)
+        )
+        warn_of_step_release(chosen)
+        if begins and step.start == "equilibrium":
+            still = self.rebuilt(effects=others)
+            # amplitudes that are there from the first moment; those that grow have not begun
+            still.run(Static(until=Time(1e-12 * step.end_time)), grow=[], progress=False)
+            start_from(self.analysis, still.analysis)
+            still.close()
+
     def _go(
         self,
-        step: Static | Cycles,
+        step: Static | Cycles | Explicit,
         restarts: RestartManager,
         *,
         progress: bool,
@@ -437,7 +481,10 @@ class Scene:
                 "checkpoint_point": restarts.checkpoint_point if restarts.wanted else None,
                 "resume": restarts.progress,
             }
-            if isinstance(step, Cycles):
+            if isinstance(step, Explicit):
+                assert isinstance(self.solver, ExplicitSolver)
+                reason = run_explicit(self.analysis, self.solver, step, **controls)
+            elif isinstance(step, Cycles):
                 reason = run_cycles(self.analysis, step, **controls)
             else:
                 reason = run_static(self.analysis, step, **controls)
@@ -450,18 +497,20 @@ class Scene:
         solver = self.solver
         details: dict[str, Any] = {
             "dofs": self.continuum.n_global,
-            "window": solver.system.n_retained,
             "releases": sum(g.n_released for g in self.cracks),
             "factorizations": solver.timings.factorizations,
             "ranks": self.mesh.comm.size,
-            "contact_steps": solver.system.contact_steps,
             "seconds": dict(solver.timings.seconds),
         }
+        if isinstance(solver, ExplicitSolver):
+            return details | solver.about()
+        system = self.analysis.condensed.system
+        details |= {"window": system.n_retained, "contact_steps": system.contact_steps}
         if self.fatigue.table["N"]:
             details["tips"] = self.fatigue.table
         return details
 
-    def _reach(self, step: Static | Cycles) -> list[float]:
+    def _reach(self, step: Static | Cycles | Explicit) -> list[float]:
         """How far each crack may grow in a step, length."""
         out = [np.inf] * len(self.pairs)
         for end in step.ends:

@@ -144,7 +144,7 @@ def measure(case: ScaleCase, comm: MPI.Intracomm) -> Result:
     clock.append(time.perf_counter())
     (debond,) = scene.debonds
     if case.ahead:
-        scene.solver.prepare([True], [LENGTHS[-1] - LENGTHS[0]])
+        scene.analysis.condensed.prepare([True], [LENGTHS[-1] - LENGTHS[0]])
     else:
         reach = LENGTHS[0] + _ROWS * problem.dx
         scene.run(Static(until=CrackLength(debond.interface, reach)), progress=False)
@@ -156,7 +156,7 @@ def measure(case: ScaleCase, comm: MPI.Intracomm) -> Result:
         seconds[phase] = spent.get(phase, 0.0)
     seconds |= {phase: spent.get(phase, 0.0) for phase in ("columns", "growth", "fields")}
     seconds["total"] = end - clock[0] - (clock[3] - clock[2])
-    system = scene.solver.system
+    system = scene.analysis.condensed.system
     assert isinstance(scene.solver, LinearSolver)
     store = scene.solver.columns
     space = store.space if store is not None else None

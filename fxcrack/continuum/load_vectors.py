@@ -11,10 +11,12 @@ from __future__ import annotations
 from typing import Any
 
 import dolfinx.fem.petsc
+import numpy as np
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import (
@@ -30,6 +32,33 @@ from fxcrack.continuum.loads import (
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.shell_forces import shell_load
 from fxcrack.continuum.thermal_strain import ThermalLoad, load_form
+
+
+class LoadPattern:
+    """Nodal values on the owned dofs, kept where they differ from zero.
+
+    Args:
+        values: Shape (n_local,).
+
+    Attributes:
+        at: Where they do; everything where most of them do.
+        values: The values there.
+    """
+
+    def __init__(self, values: Array) -> None:
+        found = np.flatnonzero(values)
+        self.at: Ints | slice = found if len(found) < len(values) // 4 else slice(None)
+        self.values = values[self.at].copy()
+
+    def add(self, total: Array, factor: float) -> None:
+        """Add the values times a factor to a vector of the owned dofs, in place."""
+        total[self.at] += factor * self.values
+
+    def dense(self, n_local: int) -> Array:
+        """All values, shape (n_local,)."""
+        out = np.zeros(n_local)
+        out[self.at] = self.values
+        return out
 
 
 def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:

@@ -62,6 +62,26 @@ def total(rates: npt.ArrayLike) -> Array:
     return np.asarray(clip(rates).sum(axis=-1))
 
 
+def least_critical(law: MixedMode, toughness: Array) -> Array:
+    """A rate such that f < 1 as long as no sum of rates reaches it, whatever the mode mix.
+
+    Laws that blend toughnesses never fall below the least of them. Of others, whose f rises with
+    each rate, it is the rate of each mode at f = 1 with all three alike.
+
+    Args:
+        law: Mode-mix law.
+        toughness: G_Ic, G_IIc, G_IIIc, shape (n, 3) [force/length].
+
+    Returns:
+        Shape (n,) [force/length].
+    """
+    least = np.asarray(toughness.min(axis=-1))
+    if isinstance(law, _ShearExponent):
+        return least
+    alike = law.critical(np.ones_like(toughness), toughness) / 3.0
+    return np.asarray(np.minimum(least, alike))
+
+
 @dataclass(frozen=True)
 class _ShearExponent(ABC):
     """What the laws have in common that blend toughnesses by the share of shear, B^eta."""

@@ -153,9 +153,26 @@ class ProgressiveRelease(ReleaseLaw):
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
     the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A divided by the size of F0.
+
+    Attributes:
+        zone: Elements over which a bond softens, 1 or 2. With 2 softening begins at f = 1/2 and
+            spends the same energy, which leaves a fast crack (above a third of the Rayleigh speed)
+            less energy to lose to waves of mesh length; explicit dynamics only.
     """
 
+    zone: int = 1
+
     driver: ClassVar[Driver] = "opening"
+
+    def __post_init__(self) -> None:
+        """Check the zone."""
+        if self.zone not in (1, 2):
+            raise InputError(f"ProgressiveRelease: zone = {self.zone!r}: choose 1 or 2 elements")
+
+    @property
+    def onset(self) -> float:
+        """Value of f at which softening begins."""
+        return 1.0 / self.zone
 
     def remaining(self, progress: npt.ArrayLike) -> Array:
         """Remaining fraction.

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
@@ -21,7 +22,7 @@ class Explanation:
     """A scene in numbers.
 
     Attributes:
-        solver: "linear" or "newton".
+        solver: "linear", "newton" or "explicit".
         why: Reasons for the solver.
         effects: What is on beyond small linear elasticity.
         unknowns: How many there are, by kind; kinds that the scene lacks are not listed.
@@ -29,6 +30,7 @@ class Explanation:
         phases: Seconds of the runs so far, by phase of the solution.
         costs: Seconds of the runs so far, by effect.
         groups: Integration, plies, slenderness and shear factors of groups of continuum shells.
+        notes: What else decides how the scene is solved, one sentence each.
     """
 
     solver: str
@@ -39,6 +41,7 @@ class Explanation:
     phases: dict[str, float]
     costs: dict[str, float]
     groups: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
     @property
     def path(self) -> str:
@@ -58,6 +61,7 @@ class Explanation:
         lines += self.groups
         lines.append("unknowns: " + _listed(self.unknowns))
         lines.append("counted: " + _listed(self.counts))
+        lines += self.notes
         for title, table in (("phases", self.phases), ("effects", self.costs)):
             if table:
                 width = max(len(name) for name in table)
@@ -72,11 +76,13 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
     """Look at a scene or its analysis; collective, the same on every rank."""
     analysis = analysis_of(source)
     solver = analysis.solver
+    if isinstance(solver, ExplicitSolver):
+        return _explicit(analysis, solver)
     unknowns = {"displacements": analysis.continuum.n_global}
     counts = {"form terms": 1, "factorisations": solver.timings.factorizations}
     costs: dict[str, float] = {}
     if analysis.started:
-        system = solver.system
+        system = analysis.condensed.system
         unknowns["retained jumps"] = system.n_retained
         for kind, number in (
             ("contact nodes", int(system.contact.sum())),
@@ -85,7 +91,7 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
         ):
             if number:
                 unknowns[kind] = number
-        costs = {k: v for k, v in solver.law_seconds.items() if k in INTERFACE_LAWS}
+        costs = {k: v for k, v in analysis.condensed.law_seconds.items() if k in INTERFACE_LAWS}
     if isinstance(solver, NewtonSolver):
         bodies = solver.bodies
         kept = sum(np.size(v) for term in bodies.terms for v in term.state().values())
@@ -102,6 +108,27 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
     groups = tuple(str(cells) for cells in analysis.continuum.shell_cells.values())
     return Explanation(
         plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, groups
+    )
+
+
+def _explicit(analysis: Analysis, solver: ExplicitSolver) -> Explanation:
+    """What explicit dynamics is made of."""
+    plan, lumped = analysis.plan, solver.lumped
+    unknowns = {"displacements": analysis.continuum.n_global, "interface nodes": len(lumped.nodes)}
+    counts = {"increments": solver.increments, "internal forces": solver.bodies.evaluations}
+    choice, costs = solver.bodies.choice, dict(solver.seconds)
+    per = sum(costs.values()) / max(solver.increments, 1)
+    notes = [
+        f"increment: {solver.dt:.6g}, of the largest stable one {solver.stable:.6g}, which the "
+        "highest frequency of the bodies limits (bonds and contact do not)",
+        f"operator: {choice.name}, {choice.why}",
+        f"interface: {'one master for each slave' if lumped.simple else 'slaves share masters'}",
+        f"seconds per increment: {per:.3g}, of which internal forces "
+        f"{costs['internal forces'] / max(solver.increments, 1):.3g}",
+    ]
+    seconds = dict(solver.timings.seconds)
+    return Explanation(
+        plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, tuple(notes)
     )
 
 

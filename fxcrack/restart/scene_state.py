@@ -14,7 +14,7 @@ import numpy as np
 
 from fxcrack.base.errors import InputError
 from fxcrack.restart.checkpoint import Arrays, Saved
-from fxcrack.solvers.base import Solver
+from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis, EnergyBalance
 from fxcrack.steps.bond_records import ReleaseRecord
 from fxcrack.steps.crack import Crack
@@ -128,7 +128,7 @@ _FAR = 1e-6
 round-off, and less than any other body, mesh or load would give."""
 
 
-def _check_jumps(solver: Solver, arrays: Arrays) -> None:
+def _check_jumps(solver: AnySolver, arrays: Arrays) -> None:
     """Compare the equilibrium that was found again with the saved one.
 
     Raises:

@@ -22,15 +22,11 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 
 
-class Solver(Protocol):
-    """Bodies and interfaces in equilibrium, whatever the bodies are made of.
+class AnySolver(Protocol):
+    """Bodies and interfaces, whatever the bodies are made of and however their state is found.
 
-    The interfaces are known by their retained jumps: components of the jump between the faces at
-    slave nodes, numbered 0 to n_retained - 1. All methods are collective.
-
-    How a solver moves along the load is its own: a linear one follows the exact pieces of
-    ``system.pieces``, a nonlinear one finds trial equilibria
-    (:meth:`fxcrack.solvers.newton.NewtonSolver.move`).
+    The interfaces are known by their jumps: components of the jump between the faces at slave
+    nodes, numbered from 0. All methods are collective.
 
     Attributes:
         continuum: Displacement space of the bodies.
@@ -40,22 +36,13 @@ class Solver(Protocol):
         monitors: Monitored displacements.
         fronts: Fronts per pair.
         n_loads: Number of supports and force patterns together.
-        prepared: Whether :meth:`prepare` has been called.
-        system: The dense system on the retained jumps.
-        state: Present equilibrium; set by the caller that moves along a piece of the load path.
-        index: Number of each retained jump per pair, -1 elsewhere, shape (n_nodes, gdim).
+        state: Present state: loads, given forces and jumps, and what is conjugate to the loads.
+        index: Number of each jump that is known per pair, -1 elsewhere, shape (n_nodes, gdim).
         frames: Frame of each slave node per pair, shape (n_nodes, gdim, gdim).
         held_by_supports: Jumps that supports hold at zero per pair, shape (n_nodes, gdim).
-        face_loads: Force of every force pattern on the retained jumps, shape (n_retained,
-            n_forces).
         active: Whether the crack may grow, per pair.
         around: Distances ahead of and behind the tips that the criterion needs, per pair, length.
-        rebases: Sets of retained jumps chosen since the step began.
-        friction_energy: Energy dissipated by friction so far.
-        overlap_energy: Energy given by contact that pushed overlapping faces apart so far.
         timings: Seconds per phase and number of factorisations.
-        law_seconds: Seconds per law of the interface (contact, friction, softening).
-        soft_counts: Effort spent on softening bonds.
     """
 
     continuum: Continuum
@@ -65,19 +52,110 @@ class Solver(Protocol):
     monitors: list[Monitor]
     fronts: list[Front]
     n_loads: int
-    prepared: bool
-    system: ContactSystem
     state: Equilibrium
     index: list[Ints]
     frames: list[Array]
     held_by_supports: list[Bools]
-    face_loads: Array
     active: list[bool]
     around: list[tuple[float, float]]
+    timings: Timings
+
+    def probe(self, p: int) -> Any:
+        """The :class:`fxcrack.criteria.probe.FrontProbe` of a pair."""
+
+    def holds(self, p: int, nodes: Ints) -> bool:
+        """Whether all jumps of some slave nodes that may differ from zero are known.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, shape (n,).
+        """
+
+    def remaining(self, p: int) -> tuple[Ints, Array]:
+        """Bonds of a pair that soften with their opening.
+
+        Returns:
+            Their slave nodes, and the fraction of the force at debonding that remains at each,
+            both of shape (n,).
+        """
+
+    def collect(self) -> Arrays:
+        """The accepted state as plain arrays by name, for a checkpoint."""
+
+    def resume(self, arrays: Arrays, time: float) -> None:
+        """Take a state that :meth:`collect` gave.
+
+        Args:
+            arrays: By name, of the shapes that :meth:`collect` gave; the same on all ranks, of any
+                number of ranks.
+            time: Time of the state.
+
+        Raises:
+            InputError: The arrays do not fit the mesh.
+        """
+
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies, by name."""
+
+    def spent(self) -> dict[str, float]:
+        """Energies the bodies have turned into something else, by name."""
+
+    def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Displacement of a state, the present one by default; the caller destroys it."""
+
+    def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Forces of interfaces and supports on the bodies; the caller destroys them.
+
+        Args:
+            u: Displacements of the state, from :meth:`displacement`.
+            state: The state whose loads act; the present one by default.
+        """
+
+    def vectors(self, p: int, nodes: Ints, values: Array) -> Array:
+        """Jump or force components at slave nodes as global vectors.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes, shape (...,).
+            values: Values of the numbered jumps, shape (n_jumps,).
+
+        Returns:
+            Shape (..., 3); zero where a component has no number.
+        """
+
+    def destroy(self) -> None:
+        """Free all PETSc objects."""
+
+
+class Solver(AnySolver, Protocol):
+    """Bodies condensed onto their interfaces, in equilibrium.
+
+    The interfaces are known by their retained jumps, numbered 0 to n_retained - 1. All methods are
+    collective.
+
+    How a solver moves along the load is its own: a linear one follows the exact pieces of
+    ``system.pieces``, a nonlinear one finds trial equilibria
+    (:meth:`fxcrack.solvers.newton.NewtonSolver.move`).
+
+    Attributes:
+        prepared: Whether :meth:`prepare` has been called.
+        system: The dense system on the retained jumps.
+        state: Set by the caller that moves along a piece of the load path.
+        face_loads: Force of every force pattern on the retained jumps, shape (n_retained,
+            n_forces).
+        rebases: Sets of retained jumps chosen since the step began.
+        friction_energy: Energy dissipated by friction so far.
+        overlap_energy: Energy given by contact that pushed overlapping faces apart so far.
+        law_seconds: Seconds per law of the interface (contact, friction, softening).
+        soft_counts: Effort spent on softening bonds.
+    """
+
+    prepared: bool
+    system: ContactSystem
+    face_loads: Array
     rebases: int
     friction_energy: float
     overlap_energy: float
-    timings: Timings
     law_seconds: dict[str, float]
     soft_counts: CohesiveCounts
 
@@ -97,14 +175,6 @@ class Solver(Protocol):
         """Choose the retained jumps around the present fronts, and condense again.
 
         The state is carried over.
-        """
-
-    def holds(self, p: int, nodes: Ints) -> bool:
-        """Whether all jumps of some slave nodes that may differ from zero are retained.
-
-        Args:
-            p: Number of the pair.
-            nodes: Slave nodes, shape (n,).
         """
 
     # -- from equilibrium to equilibrium -------------------------------------------------
@@ -130,21 +200,6 @@ class Solver(Protocol):
 
     def restore_interfaces(self, saved: InterfaceState) -> None:
         """Return to an earlier state of the interfaces alone, on the same retained jumps."""
-
-    def collect(self) -> Arrays:
-        """The accepted state as plain arrays by name, for a checkpoint."""
-
-    def resume(self, arrays: Arrays, time: float) -> None:
-        """Take a state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
-
-        Args:
-            arrays: By name, of the shapes that :meth:`collect` gave; the same on all ranks, of any
-                number of ranks.
-            time: Time of the state.
-
-        Raises:
-            InputError: The arrays do not fit the mesh.
-        """
 
     # -- bonds ---------------------------------------------------------------------------
 
@@ -205,39 +260,10 @@ class Solver(Protocol):
         Friction dissipates; faces that overlap give energy as contact pushes them apart.
         """
 
-    def stored(self, state: Equilibrium) -> dict[str, float]:
-        """Energies stored in the bodies, by name."""
-
-    def spent(self) -> dict[str, float]:
-        """Energies the bodies have turned into something else, by name."""
-
     def extra_work(self, state: Equilibrium) -> float:
         """Work on the bodies beyond that of supports and force patterns."""
 
     # -- fields --------------------------------------------------------------------------
-
-    def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
-        """Displacement of a state, the present one by default; the caller destroys it."""
-
-    def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
-        """Forces of interfaces and supports on the bodies; the caller destroys them.
-
-        Args:
-            u: Displacements of the state, from :meth:`displacement`.
-            state: The state whose loads act; the present one by default.
-        """
-
-    def vectors(self, p: int, nodes: Ints, values: Array) -> Array:
-        """Jump or force components at slave nodes as global vectors.
-
-        Args:
-            p: Number of the pair.
-            nodes: Slave nodes, shape (...,).
-            values: Values of the retained jumps, shape (n_retained,).
-
-        Returns:
-            Shape (..., 3); zero where a component is not retained.
-        """
 
     def components(self, p: int, nodes: Ints) -> Ints:
         """Numbers of the retained jumps of slave nodes, shape (k,)."""
@@ -255,8 +281,5 @@ class Solver(Protocol):
     def motion(self, state: Equilibrium) -> Array:
         """Displacements that are followed, shape (n_followed, gdim), length."""
 
-    def destroy(self) -> None:
-        """Free all PETSc objects."""
 
-
-__all__ = ["Solver"]
+__all__ = ["AnySolver", "Solver"]

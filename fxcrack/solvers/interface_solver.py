@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -32,6 +32,8 @@ from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.base import Solver
+from fxcrack.solvers.front_probe import CondensedFrontProbe
 
 
 class Condensed(NamedTuple):
@@ -305,6 +307,21 @@ class InterfaceSolver(ABC):
         self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 
     # -- what criteria and output ask ----------------------------------------------------
+
+    def probe(self, p: int) -> CondensedFrontProbe:
+        """What criteria may ask of a pair."""
+        return CondensedFrontProbe(cast(Solver, self), p)
+
+    def remaining(self, p: int) -> tuple[Ints, Array]:
+        """Slave nodes of a pair that soften, and the remaining fraction of the force at each."""
+        nodes, fractions = [np.zeros(0, dtype=np.int64)], [np.zeros(0)]
+        for bond in self.system.soft.bonds:
+            pair, members, _ = bond.where
+            if pair == p:
+                left = bond.force(bond.opening(self.state.jump)) / bond.strength
+                nodes.append(members)
+                fractions.append(np.full(len(members), left))
+        return np.concatenate(nodes), np.concatenate(fractions)
 
     def holds(self, p: int, nodes: Ints) -> bool:
         """Whether all jumps of some slave nodes that may differ from zero are retained.

@@ -43,3 +43,27 @@ class NewtonOptions:
             reuse=flag(owner, "reuse", self.reuse),
         )
         keep_floats(self, "tolerance", "balance")
+
+
+@dataclass(frozen=True)
+class ExplicitOptions:
+    """Controls of explicit dynamics; arguments of :class:`fxcrack.Explicit` of the same names.
+
+    Attributes:
+        dt: Increment, time; ``None``: the stable one times ``safety``.
+        safety: Part of the stable increment that is used.
+        contact: "exact": by multipliers, "penalty": by a stiffness.
+        penalty: That stiffness over m/dt^2.
+        mass_scale: Factor on the mass of all bodies, or ``"dt"``: mass is added to nodes where
+            ``dt`` would not be stable.
+        operator: "product", "assembly", or "auto".
+        tolerance: Part of the energies by which their balance may be off before the run stops.
+    """
+
+    dt: float | None = None
+    safety: float = 0.97
+    contact: str = "exact"
+    penalty: float = 0.1
+    mass_scale: float | str = 1.0
+    operator: str = "auto"
+    tolerance: float = 1e-6

@@ -17,7 +17,7 @@ from mpi4py import MPI
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
-from fxcrack.base.errors import InputError
+from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.criteria.evaluator import TipValues
@@ -25,7 +25,9 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import History
 from fxcrack.interface.pairing import Pair
 from fxcrack.mesh import Mesh
-from fxcrack.solvers.base import Solver
+from fxcrack.solvers.base import AnySolver, Solver
+from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
@@ -100,7 +102,7 @@ class Analysis:
     """
 
     continuum: Continuum
-    solver: Solver
+    solver: AnySolver
     debonds: Sequence[Debond]
     plan: Plan
     effects: Sequence[Any]
@@ -131,6 +133,17 @@ class Analysis:
         return self.solver.pairs
 
     @property
+    def condensed(self) -> Solver:
+        """The solver of bodies that are condensed onto their interfaces.
+
+        Raises:
+            SolverError: The bodies move by explicit dynamics.
+        """
+        if not isinstance(self.solver, LinearSolver | NewtonSolver):
+            raise SolverError("bodies in explicit dynamics are not condensed")
+        return self.solver
+
+    @property
     def linear(self) -> bool:
         """Whether the bodies are linear, and tips fixed by the bonds alone."""
         return self.plan.solver == "linear"
@@ -147,7 +160,7 @@ class Analysis:
     @property
     def snap_energy(self) -> float:
         """Energy lost where cohesive bonds ran through unstable states, force times length."""
-        soft, jump = self.solver.system.soft, self.solver.state.jump
+        soft, jump = self.condensed.system.soft, self.solver.state.jump
         return self.balance.released - self.balance.by_force - soft.taken(jump)
 
     def check_started(self, wanted: str) -> None:
@@ -179,7 +192,8 @@ class Analysis:
 
         It is that of a given velocity, and that of faces that overlap and are pushed apart.
         """
-        system, solver = self.solver.system, self.solver
+        solver = self.condensed
+        system = solver.system
         overlap = np.where(system.contact, np.maximum(-system.gap, 0.0), 0.0)
         dynamic = any(isinstance(e, Inertia) for e in self.effects)
         if not dynamic and not overlap.any():
@@ -214,7 +228,7 @@ class Analysis:
 
     def given_force(self, time: float) -> Array:
         """Given forces of bonds on a ramp at a time, shape (n_retained,), force."""
-        return given_forces(self.solver, self.ramps, time, self.balance.increment)
+        return given_forces(self.condensed, self.ramps, time, self.balance.increment)
 
     def add_ramp(self, ramp: ForceRamp) -> None:
         """Prescribe the forces of further bonds; ramps that have ended are removed."""
@@ -245,7 +259,7 @@ class Analysis:
         """Find the tips anew, condense anew if what they need is not retained, and evaluate."""
         tips = [g.tips() for g in self.active]
         if not all(g.held(t) for g, t in zip(self.active, tips, strict=True)):
-            self.solver.rebase()
+            self.condensed.rebase()
             for g, t in zip(self.active, tips, strict=True):
                 g.check_wake(t)
         self.tip_values = [
@@ -279,29 +293,29 @@ class Analysis:
             time: Its time.
         """
         here, balance = self.solver.state, self.balance
-        work, released, mean = self.solver.along(here, point)
+        work, released, mean = self.condensed.along(here, point)
         balance.external_work += work
         balance.released += released
-        self.solver.book_contact(here, point)
+        self.condensed.book_contact(here, point)
         for ramp in self.ramps:
-            index = self.solver.components(ramp.p, ramp.nodes)
+            index = self.condensed.components(ramp.p, ramp.nodes)
             force, last = here.force[index], point.force[index]
             spent = float(force @ here.jump[index] - last @ point.jump[index])
             spent += float((last - force) @ mean[index])
             balance.by_force += spent
-            balance.viscous += ramp.viscous_part(spent, self.solver, here.jump, point.jump)
+            balance.viscous += ramp.viscous_part(spent, self.condensed, here.jump, point.jump)
         self.solver.state = point
         balance.time = time
 
     def snapshot(self) -> Snapshot:
         """What :meth:`rollback` needs to return to the present equilibrium."""
-        return Snapshot(self.balance.copy(), self.tip_values, self.solver.remember())
+        return Snapshot(self.balance.copy(), self.tip_values, self.condensed.remember())
 
     def rollback(self, saved: Snapshot) -> None:
         """Return to an earlier equilibrium, with the same bonds."""
         self.balance = saved.balance.copy()
         self.tip_values = saved.tip_values
-        self.solver.recall(saved.solver)
+        self.condensed.recall(saved.solver)
 
 
 def largest(values: Sequence[TipValues]) -> float:

@@ -120,10 +120,8 @@ def bond_state(
     bonded, n = growth.front.bonded, len(growth.front.bonded)
     fraction = bonded.astype(float)
     state = growth.solver.state
-    for bond in growth.solver.system.soft.bonds:
-        p, nodes, _ = bond.where
-        if p == growth.p:
-            fraction[nodes] = bond.force(bond.opening(state.jump)) / bond.strength
+    nodes, left = growth.solver.remaining(growth.p)
+    fraction[nodes] = left
     for ramp in ramps:
         if ramp.p == growth.p:
             index = growth.solver.index[ramp.p][ramp.nodes]

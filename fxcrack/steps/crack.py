@@ -19,8 +19,7 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.crack_extent import CrackExtent
 from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.interface.tips import Tips
-from fxcrack.solvers.base import Solver
-from fxcrack.solvers.front_probe import CondensedFrontProbe
+from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.bond_records import ReleaseRecord, release_records
 from fxcrack.steps.debond import Debond, softens
 
@@ -46,7 +45,7 @@ class Crack:
         paths: Where tips come from.
     """
 
-    def __init__(self, solver: Solver, p: int, debond: Debond) -> None:
+    def __init__(self, solver: AnySolver, p: int, debond: Debond) -> None:
         self.solver = solver
         self.p = p
         self.title = debond.interface.title
@@ -54,7 +53,7 @@ class Crack:
         self.criterion = debond.criterion
         self.front = solver.fronts[p]
         self.extent = CrackExtent(self.front)
-        self.probe = CondensedFrontProbe(solver, p)
+        self.probe: FrontProbe = solver.probe(p)
         self.evaluator, *self.watched = (
             make_evaluator(
                 solver, self.probe, debond, c, softens=c is debond.criterion and softens(debond)
@@ -201,7 +200,7 @@ class Crack:
 
 
 def make_evaluator(
-    solver: Solver, probe: FrontProbe, debond: Debond, criterion: Criterion, *, softens: bool
+    solver: AnySolver, probe: FrontProbe, debond: Debond, criterion: Criterion, *, softens: bool
 ) -> Evaluator:
     """The evaluator of a criterion on an interface; collective.
 

@@ -18,6 +18,7 @@ from fxcrack.base.checks import between, finite, keep, keep_floats, number, numb
 from fxcrack.base.errors import InputError
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Time, Until, conditions
+from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.static import Static
 
 
@@ -149,7 +150,7 @@ class Cycles:
             )
 
 
-def check_criteria(step: Static | Cycles, debonds: Sequence[Debond]) -> None:
+def check_criteria(step: Static | Cycles | Explicit, debonds: Sequence[Debond]) -> None:
     """Fatigue grows in cycles, everything else outside them.
 
     Args:

@@ -153,11 +153,11 @@ class _Cycling:
 
     def _stabilised_cycle(self) -> list[TipCycle]:
         """What the cycle does at the tips of each interface; the state stays at the maximum."""
-        system = self._analysis.solver.system
+        system = self._analysis.condensed.system
         ends = [loads for _, loads in self._corners[1:]]
         if len(ends) > 1 or system.friction is not None:
             ends.append(self._corners[0][1])
-        saved = self._analysis.solver.interface_state()
+        saved = self._analysis.condensed.interface_state()
         corners, largest = self._once(self._instant(self._analysis.solver.state), ends)
         if system.friction is not None:
             # slips settle over some cycles
@@ -172,7 +172,7 @@ class _Cycling:
         way = corners[:1]
         for a, b in pairwise(corners):
             way += self._between(a, b, largest, _HALVINGS)
-        self._analysis.solver.restore_interfaces(saved)
+        self._analysis.condensed.restore_interfaces(saved)
         return self._extremes(way)
 
     def _once(self, start: _Instant, ends: list[Array]) -> tuple[list[_Instant], Array]:
@@ -188,11 +188,11 @@ class _Cycling:
             g.evaluator.measure(v.tips, state, time) if len(v.tips) else none
             for g, v in self._analysis.at_tips()
         ]
-        return _Instant(state, measured, self._analysis.solver.system.closed.tobytes(), straight)
+        return _Instant(state, measured, self._analysis.condensed.system.closed.tobytes(), straight)
 
     def _way_to(self, start: Equilibrium, loads: Array) -> list[_Instant]:
         """Instants from an equilibrium (left out) to other loads."""
-        system = self._analysis.solver.system
+        system = self._analysis.condensed.system
         force = self._analysis.given_force(self._analysis.time)
         if system.soft.bonds or system.friction is not None:
             # friction, and cohesive bonds that an earlier step opened in part, depend on the path

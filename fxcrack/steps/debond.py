@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy.typing as npt
 
@@ -21,6 +21,9 @@ from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion, ReleaseLaw, StepRelease, release_laws
 from fxcrack.interface.pairing import Interface, Pair
 
+_BY_DEFAULT = StepRelease()
+"""The law of debonds that name none; told from one that was chosen by identity."""
+
 
 @dataclass(frozen=True, eq=False)
 class Debond:
@@ -29,7 +32,8 @@ class Debond:
     Args:
         interface: Where.
         criterion: When.
-        release: How the bond force goes to zero.
+        release: How the bond force goes to zero; by default at once, in an
+            :class:`fxcrack.Explicit` step progressively.
         temperature: Temperature of the interface, a number or a function of positions of shape
             (3, n), for toughness, strength or critical opening tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.
@@ -37,9 +41,14 @@ class Debond:
 
     interface: Interface
     criterion: Criterion
-    release: ReleaseLaw = field(default_factory=StepRelease)
+    release: ReleaseLaw = _BY_DEFAULT
     watch: Sequence[Criterion] = ()
     temperature: float | Callable[[Array], npt.ArrayLike] | None = None
+
+    @property
+    def release_chosen(self) -> bool:
+        """Whether the release law was named, and is not the default."""
+        return self.release is not _BY_DEFAULT
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""

@@ -8,7 +8,7 @@ How the step proceeds is a function of the driver, one per stepping: event, path
 from __future__ import annotations
 
 import time as clock
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -21,7 +21,7 @@ from fxcrack.history import Row
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
-from fxcrack.steps.end_conditions import CrackLength, Releases, Time
+from fxcrack.steps.end_conditions import CrackLength, Releases, Time, Until
 from fxcrack.steps.increment_control import TooManyCutbacks
 from fxcrack.steps.load_path import LinearLoadPath, LoadPath
 from fxcrack.steps.newton_path import NewtonLoadPath
@@ -137,7 +137,7 @@ class StepDriver:
         wanted, present = analysis.loads_at(analysis.time), analysis.solver.state.loads
         if np.abs(wanted - present).max(initial=0.0) > 1e-12 * np.abs(wanted).max(initial=0.0):
             self.path.over_increment(analysis.time)
-            analysis.solver.commit()
+            analysis.condensed.commit()
             analysis.evaluate_tips()
 
     def checkpoint_point(self, **progress: Any) -> None:
@@ -147,32 +147,7 @@ class StepDriver:
 
     def ended(self) -> str:
         """Why the step ends in the present state; empty if it continues."""
-        analysis = self.analysis
-        for end in self.step.ends:
-            if isinstance(end, Time) and analysis.time >= end.time * (1.0 - 1e-14):
-                return f"time {end.time:g} reached"
-            if isinstance(end, Releases):
-                if sum(g.n_released for g in analysis.active) >= end.count:
-                    return f"{end.count} nodes released"
-            if isinstance(end, CrackLength):
-                g = self._crack_of(end)
-                tips = analysis.tip_values[analysis.active.index(g)].tips
-                if g.extent.length(tips) >= end.length * (1.0 - 1e-9):
-                    return f"crack length {end.length:g} of '{g.title}' reached"
-        if analysis.active and not any(len(v.tips) for v in analysis.tip_values):
-            if self.end_time < LARGE and analysis.time < self.end_time:
-                return ""
-            return "no crack tip is left"
-        return ""
-
-    def _crack_of(self, end: CrackLength) -> Crack:
-        for g in self.analysis.active:
-            if g.debond.interface is end.interface:
-                return g
-        raise InputError(
-            f"CrackLength names interface '{end.interface.title}', which has no active Debond in "
-            "this step"
-        )
+        return why_ended(self.analysis, self.step.ends, self.end_time)
 
     def breaks_ahead(self) -> list[float]:
         """Later times at which an amplitude, a ramp or a criterion changes its slope."""
@@ -180,6 +155,42 @@ class StepDriver:
         own = [t for ramp in self.analysis.ramps for t in ramp.breaks()]
         own += [t for g in self.analysis.active for t in g.evaluator.breaks()]
         return [b for b in (*self.breaks, *own) if b > self.analysis.time + small]
+
+
+def why_ended(analysis: Analysis, ends: Sequence[Until], end_time: float) -> str:
+    """Why a step ends in the present state; empty if it continues.
+
+    Args:
+        analysis: The analysis, its tip values up to date.
+        ends: End conditions.
+        end_time: Time at which the step ends; :data:`LARGE` if it has none.
+    """
+    for end in ends:
+        if isinstance(end, Time) and analysis.time >= end.time * (1.0 - 1e-14):
+            return f"time {end.time:g} reached"
+        if isinstance(end, Releases):
+            if sum(g.n_released for g in analysis.active) >= end.count:
+                return f"{end.count} nodes released"
+        if isinstance(end, CrackLength):
+            g = _crack_of(analysis, end)
+            tips = analysis.tip_values[analysis.active.index(g)].tips
+            if g.extent.length(tips) >= end.length * (1.0 - 1e-9):
+                return f"crack length {end.length:g} of '{g.title}' reached"
+    if analysis.active and not any(len(v.tips) for v in analysis.tip_values):
+        if end_time < LARGE and analysis.time < end_time:
+            return ""
+        return "no crack tip is left"
+    return ""
+
+
+def _crack_of(analysis: Analysis, end: CrackLength) -> Crack:
+    for g in analysis.active:
+        if g.debond.interface is end.interface:
+            return g
+    raise InputError(
+        f"CrackLength names interface '{end.interface.title}', which has no active Debond in "
+        "this step"
+    )
 
 
 def _seconds_of_factorisations(timings: Timings) -> float:

@@ -29,7 +29,7 @@ _ROUND_OFF = 1e-6
 """Energies below this part of the products of loads and their conjugates are differences of large
 numbers (a body that expands freely stores nothing), and no measure for what is missing."""
 _STORED = ("strain_energy", "kinetic_energy")
-_GIVEN = ("external_work", "initial_kinetic_energy", "overlap_energy")
+_GIVEN = ("external_work", "initial_energy", "initial_kinetic_energy", "overlap_energy")
 _ADVICE = (
     "the increments are too long for the contact, friction or finite strain of the scene (give "
     "maximum=, minimum= or dt=), or the run has left the equilibrium path"

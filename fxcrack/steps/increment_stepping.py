@@ -79,9 +79,9 @@ def step_by_increments(driver: StepDriver) -> str:
                 control.rejected(used, f"f = {largest(values):.4g}")
             continue
         analysis.tip_values = values
-        analysis.solver.commit()
+        analysis.condensed.commit()
         for ramp in analysis.ramps:
-            ramp.accept(analysis.time, analysis.solver)
+            ramp.accept(analysis.time, analysis.condensed)
         driver.record("increment")
         if not smallest:
             control.accepted()

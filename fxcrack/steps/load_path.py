@@ -95,7 +95,7 @@ class LinearLoadPath:
 
     def to_crossing(self, target: float, *, upward: bool) -> bool:
         """See :meth:`LoadPath.to_crossing`."""
-        analysis, system = self._analysis, self._analysis.solver.system
+        analysis, system = self._analysis, self._analysis.condensed.system
         begin, values = analysis.time, analysis.tip_values
         snaps = system.soft.counts.snaps
         for fraction, point in self._pieces_to(target):
@@ -150,7 +150,7 @@ class LinearLoadPath:
         """Linear pieces of the way to a time: the fraction at which each ends, and its end."""
         analysis = self._analysis
         loads, force = analysis.loads_at(target), analysis.given_force(target)
-        return analysis.solver.system.pieces(analysis.solver.state, loads, force)
+        return analysis.condensed.system.pieces(analysis.solver.state, loads, force)
 
     def _pieces_to(self, target: float) -> Iterator[tuple[float, Equilibrium]]:
         """The same; where a piece leads nowhere, back to the end of the last one."""

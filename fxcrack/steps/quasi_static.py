@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.errors import InputError, unknown_name
+from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
@@ -55,6 +56,11 @@ def _check_releases(analysis: Analysis, step: Static) -> None:
     """Refuse releases over increments where the stepping has none."""
     for g in analysis.active:
         viscosity, law = g.criterion.viscosity, g.debond.release
+        if isinstance(law, ProgressiveRelease) and law.zone != 1:
+            raise InputError(
+                f"interface '{g.title}': ProgressiveRelease(zone={law.zone}) is for fast cracks in "
+                "explicit dynamics; use zone=1"
+            )
         over_increments = law.driver == "increments"
         if over_increments and step.stepping != "increment":
             raise InputError(
@@ -126,7 +132,7 @@ def step_by_opening(driver: StepDriver) -> str:
     """Find a proportional load from an opening that never falls; returns why the step ended."""
     analysis = driver.analysis
     _check_proportional(driver)
-    control = OpeningControl(analysis.solver, analysis.active, driver.step.monitors)
+    control = OpeningControl(analysis.condensed, analysis.active, driver.step.monitors)
     while True:
         driver.checkpoint_point()
         reason = driver.ended()
@@ -194,7 +200,7 @@ def _only_round_off(driver: StepDriver) -> bool:
     energy release rate) that of the last release would bring their f, which is round-off, to 1.
     """
     analysis = driver.analysis
-    if driver.breaks or analysis.solver.system.soft.bonds or analysis.time <= 0.0:
+    if driver.breaks or analysis.condensed.system.soft.bonds or analysis.time <= 0.0:
         return False
     by_load = all(g.criterion.depends_on_load for g in analysis.active)
     released = any(g.n_released for g in analysis.active)

@@ -62,7 +62,7 @@ def release_tips(
 
 def _open(analysis: Analysis, g: Crack, nodes: Ints, values: TipValues) -> None:
     """Open nodes by the release law of their debond: at once, cohesive, or along a ramp."""
-    solver, time = analysis.solver, analysis.time
+    solver, time = analysis.condensed, analysis.time
     law, viscosity = g.debond.release, g.criterion.viscosity
     ramp: PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
     if g.opening_driven:
@@ -87,7 +87,7 @@ def _open_at_once(analysis: Analysis, g: Crack, nodes: Ints) -> None:
     """Take the bond forces of nodes away at constant load."""
     if not len(nodes):
         return
-    energy, work = analysis.solver.release(g.p, nodes, analysis.given_force(analysis.time))
+    energy, work = analysis.condensed.release(g.p, nodes, analysis.given_force(analysis.time))
     analysis.balance.released += energy
     analysis.balance.by_force += energy
     analysis.balance.external_work += work

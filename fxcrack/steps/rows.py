@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fxcrack.history import Row
-from fxcrack.solvers.base import Solver
+from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis
 
 Observer = Callable[[str, Row], None]
@@ -44,7 +44,7 @@ class Recorder:
             self._observer(event, row)
 
 
-def load_columns(solver: Solver) -> list[tuple[str, str, bool]]:
+def load_columns(solver: AnySolver) -> list[tuple[str, str, bool]]:
     """Columns of each support component and force pattern, in the order of ``state.loads``.
 
     Returns:
@@ -65,7 +65,7 @@ def history_row(analysis: Analysis, event: str) -> Row:
     Returns:
         The columns that :mod:`fxcrack.history` lists.
     """
-    solver, balance = analysis.solver, analysis.balance
+    solver, balance = analysis.condensed, analysis.balance
     state, system = solver.state, solver.system
     stored, spent = solver.stored(state), solver.spent()
     work = balance.external_work + solver.extra_work(state)

@@ -1,0 +1,230 @@
+"""Internal forces of the bodies in explicit dynamics: a sparse product, or assembly.
+
+Linear bodies may use either; which is faster depends on element and machine and is found out by
+timing both. Nonlinear bodies assemble their residual and nothing else.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
+import dolfinx.la
+import numpy as np
+import scipy.sparse as sp
+import ufl
+from dolfinx import fem
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.kernels import fast_form
+from fxcrack.continuum.term import Term
+
+_TRIALS = 5
+"""Evaluations of which the fastest counts when operators are compared."""
+
+
+@dataclass(frozen=True)
+class OperatorChoice:
+    """Which operator gives the internal forces, and why.
+
+    Attributes:
+        name: "product" or "assembly".
+        why: The reason, one sentence.
+        seconds: Seconds of one evaluation, of the operators that were timed.
+    """
+
+    name: str
+    why: str
+    seconds: dict[str, float]
+
+
+def local_matrix(continuum: Continuum, matrix: PETSc.Mat) -> sp.csr_matrix:
+    """Rows of the owned dofs of a matrix, columns in local numbers, ghosts last.
+
+    Args:
+        continuum: Displacement space.
+        matrix: Matrix on it, assembled.
+
+    Returns:
+        Shape (n_local, n_local + number of ghost dofs).
+    """
+    index_map, n = continuum.space.dofmap.index_map, continuum.layout.n_unknowns
+    indptr, columns, values = matrix.getValuesCSR()
+    local = columns.astype(np.int64) - continuum.offset
+    outside = np.flatnonzero((local < 0) | (local >= continuum.n_local))
+    ghosts = np.asarray(index_map.ghosts, dtype=np.int64)
+    order = np.argsort(ghosts)
+    nodes, unknown = np.divmod(columns[outside].astype(np.int64), n)
+    place = order[np.searchsorted(ghosts[order], nodes)] if len(outside) else nodes
+    local[outside] = n * (index_map.size_local + place) + unknown
+    width = n * (index_map.size_local + index_map.num_ghosts)
+    out = sp.csr_matrix((values, local.astype(np.int32), indptr), shape=(continuum.n_local, width))
+    out.sort_indices()
+    return out
+
+
+class InternalForces:
+    """Internal forces of bodies at a displacement.
+
+    Args:
+        continuum: Displacement space.
+        terms: What acts in the bodies, all but inertia.
+
+    Attributes:
+        u: The displacement, ghosts up to date.
+        linear: Whether forces are linear in the displacement: elasticity alone, at constant
+            temperature or none.
+        choice: Which operator is used; set by :meth:`choose`.
+        evaluations: How often forces were evaluated.
+    """
+
+    def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
+        self.continuum = continuum
+        self.terms = list(terms)
+        self.u = fem.Function(continuum.space, name="displacement")
+        self.linear = all(t.constant for t in terms) and continuum.temperature is None
+        self.evaluations = 0
+        self.choice = OperatorChoice("assembly", "nothing else was chosen", {})
+        self._changing = [t for t in terms if not t.constant and _has_state(t)]
+        self._form: Any = None
+        self._energies: dict[str, Any] = {}
+        self._matrix: sp.csr_matrix | None = None
+        self._vector = fem.Function(continuum.space)
+        self._evaluate: Callable[[], Array] = self._assembled
+
+    # -- operators -----------------------------------------------------------------------
+
+    def choose(self, operator: str) -> None:
+        """Choose how forces are evaluated; collective.
+
+        Args:
+            operator: "product", "assembly", or "auto": the faster one.
+        """
+        comm = self.continuum.comm
+        if not self.linear:
+            self.choice = OperatorChoice("assembly", "forces are not linear in displacement", {})
+            self._compile()
+            return
+        candidates: dict[str, Callable[[], Array]] = {
+            "product": self._product,
+            "assembly": self._assembled,
+        }
+        if operator != "auto":
+            self._evaluate = candidates[operator]
+            self.choice = OperatorChoice(operator, "it was asked for", {})
+            self._evaluate()
+            return
+        seconds = {}
+        for name, evaluate in candidates.items():
+            evaluate()  # compiles and assembles what it needs
+            best = np.inf
+            for _ in range(_TRIALS):
+                start = time.process_time()
+                evaluate()
+                best = min(best, time.process_time() - start)
+            seconds[name] = float(comm.allreduce(best, op=MPI.MAX))
+        faster = min(seconds, key=lambda name: seconds[name])
+        self._evaluate = candidates[faster]
+        why = "the faster one: " + ", ".join(f"{k} {1e3 * s:.3g} ms" for k, s in seconds.items())
+        self.choice = OperatorChoice(faster, why, seconds)
+        if faster == "assembly":
+            self._matrix = None
+
+    def stiffness(self) -> sp.csr_matrix:
+        """Linear elastic stiffness at zero strain, of the owned rows; collective."""
+        if self._matrix is None:
+            matrix = self.continuum.stiffness()
+            self._matrix = local_matrix(self.continuum, matrix)
+            matrix.destroy()
+        return self._matrix
+
+    def _product(self) -> Array:
+        return np.asarray(self.stiffness() @ self.u.x.array)
+
+    def _compile(self) -> None:
+        if self._form is None:
+            v, comm = ufl.TestFunction(self.continuum.space), self.continuum.comm
+            self._form = fast_form(comm, sum(t.residual(self.u, v) for t in self.terms))
+
+    def _assembled(self) -> Array:
+        self._compile()
+        values = self._vector.x.array
+        values[:] = 0.0
+        fem.assemble_vector(values, self._form)
+        if self.continuum.comm.size > 1:
+            self._vector.x.scatter_reverse(dolfinx.la.InsertMode.add)
+        return np.asarray(values[: self.continuum.n_local])
+
+    # -- forces and energies -------------------------------------------------------------
+
+    def forces(self) -> Array:
+        """Internal forces at :attr:`u`, shape (n_local,), force; collective.
+
+        The array is overwritten by the next call.
+        """
+        self.evaluations += 1
+        for term in self._changing:
+            term.update(self.u)
+        return self._evaluate()
+
+    def tangent_product(self, direction: Array) -> Array:
+        """Tangent stiffness at :attr:`u` times a direction; collective.
+
+        Args:
+            direction: Shape (n_local,), length.
+
+        Returns:
+            A new array of shape (n_local,), force.
+        """
+        x, n, comm = self.u.x, self.continuum.n_local, self.continuum.comm
+        before = x.array.copy()
+        if self.linear:
+            x.array[:n] = direction
+            x.scatter_forward()
+            out = self.forces().copy()
+        else:
+            # a motion far below any displacement that matters, far above round-off
+            scale = comm.allreduce(float(np.abs(direction).max(initial=0.0)), op=MPI.MAX)
+            small = 1e-7 * self._length / scale
+            sides = []
+            for sign in (1.0, -1.0):
+                x.array[:n] = before[:n] + sign * small * direction
+                x.scatter_forward()
+                sides.append(self.forces().copy())
+            out = (sides[0] - sides[1]) / (2.0 * small)
+        x.array[:] = before
+        return np.asarray(out)
+
+    @property
+    def _length(self) -> float:
+        """Length of the smallest cell, to scale motions; found once."""
+        if not hasattr(self, "_smallest"):
+            domain, tdim = self.continuum.mesh.domain, self.continuum.mesh.tdim
+            n = domain.topology.index_map(tdim).size_local
+            sizes = domain.h(tdim, np.arange(n, dtype=np.int32))
+            low = float(np.min(sizes, initial=np.inf))
+            self._smallest = float(self.continuum.comm.allreduce(low, op=MPI.MIN))
+        return self._smallest
+
+    def stored(self) -> float:
+        """Energy stored at :attr:`u`, force times length; collective."""
+        if not self._energies:
+            comm = self.continuum.comm
+            total = [e for e in (t.energy(self.u) for t in self.terms) if e is not None]
+            self._energies = {"stored": fast_form(comm, sum(total))} if total else {}
+        value = sum(fem.assemble_scalar(form) for form in self._energies.values())
+        return float(self.continuum.comm.allreduce(value, op=MPI.SUM))
+
+
+def _has_state(term: Term) -> bool:
+    """Whether a term stores anything that a new displacement changes."""
+    return bool(term.state())
+
+
+__all__ = ["InternalForces", "OperatorChoice", "local_matrix"]

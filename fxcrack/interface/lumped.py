@@ -1,0 +1,323 @@
+"""Interfaces between bodies of lumped mass: ties, masses and compliances, whole on every rank.
+
+A bonded slave node follows its masters exactly, a_s = sum_m W_sm a_m, and gives them its force and
+its mass:
+
+    a_m = (f_m + sum_s W_sm f_s)/(m_m + sum_s W_sm m_s)
+
+Row sums of the tied mass keep the mass diagonal and all momentum. The bond force on the slave is
+what is left, p = m_s a_s - f_s. The kinetic energy of row sums is a little larger than that of the
+nodes; it is :meth:`LumpedInterface.excess_energy`, zero where meshes match.
+
+For open nodes d = u_s - sum_m W_sm u_m is free, and a force p on the slave side with its reaction
+on the masters accelerates the jump by H p, with a compliance H per component of
+
+    H = sum_j B_j^2/m_j,    B = (E_s - W) T
+
+where T takes the motion of the nodes that follow nothing to that of all nodes and prescribed
+components count as infinite mass. Where every slave has one master of its own, all of this is
+indexing; otherwise sparse products.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.errors import InterfaceError
+from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.interface.nodes import InterfaceNodes
+from fxcrack.interface.pairing import Pair
+from fxcrack.interface.supports import Supports, align_frames, check_slaves
+
+
+@dataclass(frozen=True)
+class _Tie:
+    """Tied rows whose slaves follow nodes that are settled before them.
+
+    Attributes:
+        rows: The rows.
+        slaves: Their nodes.
+        masters: One node each where there is one master, else ``None``.
+        weights: W of these rows, and its transpose, where there are several.
+    """
+
+    rows: Ints
+    slaves: Ints
+    masters: Ints | None
+    weights: tuple[Any, Any] | None
+
+
+class LumpedInterface:
+    """All pairs of a scene, one row for each slave node that has a jump.
+
+    Args:
+        layout: Unknowns of nodes and their numbers.
+        pairs: Interfaces.
+        supports: Prescribed components.
+        mass: Mass of the owned dofs, shape (n_local,).
+
+    Raises:
+        InterfaceError: A support holds a bonded slave but not its masters alike, a node is a slave
+            twice, or interfaces form a cycle.
+
+    Attributes:
+        nodes: The interface nodes; arrays below have one row for each of them.
+        mass: Their mass, shape (n_nodes,).
+        pair: Pair of each row, shape (n_rows,).
+        slave_node: Slave node of each row in its pair's surface, shape (n_rows,).
+        row_of: Row of each slave node per pair, -1 where it has no jump, shape (n_slaves,).
+        jumped: Per pair, the slave nodes that have a jump, shape (n_slaves,).
+        slave: Interface node of each row's slave, shape (n_rows,).
+        simple: Whether every slave has one master of its own.
+        frames: Frame of each row, columns normal and tangents, shape (n_rows, gdim, gdim).
+        held: Components of these frames that supports hold, shape (n_rows, gdim).
+        gap: Initial normal gap of each row, shape (n_rows,), length.
+        which: Support column of each component of the nodes, -1 if free, shape (n_nodes, gdim).
+        value: Entry of that column, same shape.
+        tied: Whether each row is tied, shape (n_rows,); set by :meth:`set_ties`.
+        open: Rows that are not tied.
+        group_mass: Mass of the nodes with that of the slaves tied to them, shape (n_nodes,).
+        inverse: 1/group_mass per component, 0 where prescribed, shape (n_nodes, gdim).
+        compliance: H of the open rows per component, shape (n_open, gdim).
+    """
+
+    def __init__(
+        self, layout: DofLayout, pairs: Sequence[Pair], supports: Supports, mass: Array
+    ) -> None:
+        gdim = layout.gdim
+        self.jumped = [p.paired.copy() for p in pairs]
+        self.nodes = nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=self.jumped)
+        self.which, self.value = supports.at_nodes(nodes)
+        check_slaves(pairs, self.jumped, nodes, self.which, self.value, supports)
+        self.mass = nodes.gather(mass)[:, 0] if len(nodes) else np.zeros(0)
+        at_slaves = [
+            np.where(j[:, None], self._support_of(p), -1)
+            for p, j in zip(pairs, self.jumped, strict=True)
+        ]
+        frames, held = align_frames(list(pairs), at_slaves, self.jumped, supports, gdim)
+        self.pair_frames, self.pair_held = frames, held
+        counts = [int(j.sum()) for j in self.jumped]
+        self.pair = np.repeat(np.arange(len(pairs)), counts)
+        self.slave_node = _joined([np.flatnonzero(j) for j in self.jumped])
+        self.row_of = []
+        first = 0
+        for jumped, count in zip(self.jumped, counts, strict=True):
+            rows = np.full(len(jumped), -1, dtype=np.int64)
+            rows[jumped] = first + np.arange(count)
+            self.row_of.append(rows)
+            first += count
+        self.n_rows = first
+        self.slave = _joined(
+            [nodes.find(p.surface.dofs[j]) for p, j in zip(pairs, self.jumped, strict=True)]
+        )
+        self.frames = _stacked([f[j] for f, j in zip(frames, self.jumped, strict=True)], gdim)
+        self.held = _stacked([h[j] for h, j in zip(held, self.jumped, strict=True)], gdim, bool)
+        self.gap = np.concatenate(
+            [np.zeros(0), *(p.gap[j] for p, j in zip(pairs, self.jumped, strict=True))]
+        )
+        self.set_pairing(pairs)
+
+    def _support_of(self, pair: Pair) -> Ints:
+        """Support column of each slave's displacement; those without a jump do not count."""
+        found = np.clip(self.nodes.find(pair.surface.dofs), 0, max(len(self.nodes) - 1, 0))
+        if not len(self.nodes):
+            return np.full((len(found), self.which.shape[1]), -1)
+        return np.asarray(self.which[found])
+
+    def set_pairing(self, pairs: Sequence[Pair]) -> None:
+        """Take masters and weights of pairs, the same slave nodes and masters among the nodes.
+
+        :meth:`set_ties` must follow.
+        """
+        n, row, column, weight = len(self.nodes), [], [], []
+        for pair, rows in zip(pairs, self.row_of, strict=True):
+            has = rows >= 0
+            weights, masters = pair.weights[has], self.nodes.find(pair.masters[has])
+            row.append(np.repeat(rows[has], weights.shape[1]))
+            column.append(masters.ravel())
+            weight.append(weights.ravel())
+        self.weights = sp.csr_matrix(
+            (np.concatenate([np.zeros(0), *weight]), (_joined(row), _joined(column))),
+            shape=(self.n_rows, n),
+        )
+        self.weights.eliminate_zeros()
+        self.weights.sort_indices()
+        single = bool(np.all(np.diff(self.weights.indptr) == 1))
+        self.master = self.weights.indices.astype(np.int64) if single else None
+        self.depth = self._depths()
+        self.simple = (
+            self.master is not None
+            and len(np.unique(self.master)) == self.n_rows
+            and not self.depth.any()
+        )
+
+    def _depths(self) -> Ints:
+        """How many slaves stand between each row and nodes that are no slaves, shape (n_rows,)."""
+        row_at = np.full(len(self.nodes), -1, dtype=np.int64)
+        row_at[self.slave] = np.arange(self.n_rows)
+        rows = np.repeat(np.arange(self.n_rows), np.diff(self.weights.indptr))
+        below = row_at[self.weights.indices]
+        rows, below = rows[below >= 0], below[below >= 0]
+        depth = np.zeros(self.n_rows, dtype=np.int64)
+        for _ in range(self.n_rows + 1):
+            deeper = depth.copy()
+            np.maximum.at(deeper, rows, depth[below] + 1)
+            if np.array_equal(deeper, depth):
+                return depth
+            depth = deeper
+        raise InterfaceError(
+            "interfaces form a cycle: a slave node is master of a node that is in turn its master; "
+            "exchange slave and master of one of them"
+        )
+
+    # -- ties ----------------------------------------------------------------------------
+
+    def set_ties(self, tied: Bools) -> None:
+        """Tie some rows, shape (n_rows,), and leave the others open."""
+        self.tied, self.open = tied.copy(), np.flatnonzero(~tied)
+        self._ties = [
+            self._tie(np.flatnonzero(tied & (self.depth == d)))
+            for d in range(int(self.depth.max(initial=0)), -1, -1)
+        ]
+        self._ties = [t for t in self._ties if len(t.rows)]
+        self.group_mass = self.collect(self.mass[:, None].copy())[:, 0]
+        self.inverse = np.where(self.which < 0, 1.0 / self.group_mass[:, None], 0.0)
+        self._open_slaves = self.slave[self.open]
+        if self.simple:
+            assert self.master is not None
+            self._open_masters = self.master[self.open]
+            both = self.inverse[self._open_slaves] + self.inverse[self._open_masters]
+            self.compliance = np.asarray(both)
+            return
+        n, m = len(self.nodes), len(self.open)
+        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self._open_slaves)), shape=(m, n))
+        self._jump = sp.csr_matrix(picks - self.weights[self.open])
+        self._jump_t = self._jump.T.tocsr()
+        self._root = sp.csr_matrix(self._jump @ self._motion())
+        self._root_t = self._root.T.tocsr()
+        self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
+
+    def _tie(self, rows: Ints) -> _Tie:
+        if self.simple:
+            assert self.master is not None
+            return _Tie(rows, self.slave[rows], self.master[rows], None)
+        weights = self.weights[rows]
+        return _Tie(rows, self.slave[rows], None, (weights, weights.T.tocsr()))
+
+    def _motion(self) -> Any:
+        """T, motion of all nodes by that of those that follow nothing, (n_nodes, n_nodes)."""
+        n = len(self.nodes)
+        keep = np.ones(n)
+        keep[self.slave[self.tied]] = 0.0
+        out = sp.csr_matrix(sp.diags(keep))
+        for tie in reversed(self._ties):
+            m = len(tie.rows)
+            place = sp.csr_matrix((np.ones(m), (tie.slaves, np.arange(m))), shape=(n, m))
+            out = out + place @ (self.weights[tie.rows] @ out)
+        return out
+
+    def collect(self, values: Array) -> Array:
+        """Add to the masters what tied slaves give them, in place.
+
+        Args:
+            values: Forces or masses of the nodes, shape (n_nodes, k); slaves keep what they had
+                with what their own slaves gave them.
+        """
+        for tie in self._ties:
+            if tie.masters is not None:
+                values[tie.masters] += values[tie.slaves]
+            elif tie.weights is not None:
+                values += tie.weights[1] @ values[tie.slaves]
+        return values
+
+    def follow(self, values: Array) -> Array:
+        """Let tied slaves follow their masters, in place; motion of the nodes, (n_nodes, gdim)."""
+        for tie in reversed(self._ties):
+            if tie.masters is not None:
+                values[tie.slaves] = values[tie.masters]
+            elif tie.weights is not None:
+                values[tie.slaves] = tie.weights[0] @ values
+        return values
+
+    def bond_forces(self, acceleration: Array, total: Array) -> tuple[Ints, Array]:
+        """Bond forces on the slaves of the tied rows.
+
+        Args:
+            acceleration: Of the nodes, after :meth:`follow`, shape (n_nodes, gdim).
+            total: Forces on the nodes, after :meth:`collect`, same shape.
+
+        Returns:
+            The rows, and p, shape (n_tied, gdim), force.
+        """
+        rows, forces = [], []
+        for tie in self._ties:
+            s = tie.slaves
+            rows.append(tie.rows)
+            forces.append(self.group_mass[s, None] * acceleration[s] - total[s])
+        if len(rows) == 1:
+            return rows[0], forces[0]
+        return _joined(rows), _stacked_vectors(forces, acceleration.shape[1])
+
+    def excess_energy(self, velocity: Array) -> float:
+        """Kinetic energy that row sums of tied masses hold beyond that of the nodes.
+
+        Args:
+            velocity: Of the nodes, shape (n_nodes, gdim), length/time.
+        """
+        if self.simple:
+            return 0.0
+        square = (velocity**2).sum(axis=1)
+        slaves = self.slave[self.tied]
+        root = np.ones(len(self.nodes), dtype=bool)
+        root[slaves] = False
+        more = float((self.group_mass - self.mass)[root] @ square[root])
+        return 0.5 * (more - float(self.mass[slaves] @ square[slaves]))
+
+    # -- open rows -----------------------------------------------------------------------
+
+    def jumps(self, values: Array) -> Array:
+        """Jumps of the open rows in a motion of the nodes, shape (n_open, gdim)."""
+        if self.simple:
+            return np.asarray(values[self._open_slaves] - values[self._open_masters])
+        return np.asarray(self._jump @ values)
+
+    def push(self, total: Array, forces: Array) -> None:
+        """Add forces on the slave side of the open rows, and their reactions, in place.
+
+        Args:
+            total: Forces on the nodes after :meth:`collect`, shape (n_nodes, gdim).
+            forces: Shape (n_open, gdim).
+        """
+        if self.simple:
+            total[self._open_slaves] += forces
+            total[self._open_masters] -= forces
+        else:
+            total += self.collect(self._jump_t @ forces)
+
+    def response(self, forces: Array) -> Array:
+        """Acceleration of the open jumps by forces on all of them, shape (n_open, gdim)."""
+        if self.simple:
+            return np.asarray(self.compliance * forces)
+        return np.asarray(self._root @ (self.inverse * (self._root_t @ forces)))
+
+
+def _joined(parts: Sequence[Any]) -> Ints:
+    return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)
+
+
+def _stacked(parts: Sequence[Any], gdim: int, kind: Any = float) -> Any:
+    tail = parts[0].shape[1:] if parts else (gdim,)
+    return np.concatenate([np.zeros((0, *tail), dtype=kind), *parts])
+
+
+def _stacked_vectors(parts: Sequence[Array], gdim: int) -> Array:
+    return np.concatenate([np.zeros((0, gdim)), *parts])
+
+
+__all__ = ["LumpedInterface"]

@@ -1,0 +1,660 @@
+"""Explicit dynamics: central differences, lumped masses, exact bonds; no factorisation.
+
+    f = f_ext - f_int(u^n) - r_M M v^{n-1/2} + forces of interfaces and supports
+    v^{n+1/2} = v^{n-1/2} + h f/m,    u^{n+1} = u^n + dt v^{n+1/2}
+
+h is the mean of the last increment and the present one, half of it in the first. Energies belong to
+the middle of increments. Work counts with the mean velocity, f . h (v^{n-1/2} + v^{n+1/2})/2, with
+which for linear bodies and constant dt
+
+    T = 1/2 v . M v,   U = 1/2 u^n . f_int(u^{n+1}),   change of T + U = work of all other forces
+
+holds to round-off (of nonlinear bodies to the square of the increment, with U below).
+
+An increment has two halves: :meth:`ExplicitSolver.begin` finds forces and accelerations at the
+present displacement, where criteria look at them and bonds are released;
+:meth:`ExplicitSolver.finish` moves the bodies.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.errors import InputError
+from fxcrack.base.timings import Timings
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.continuum.load_vectors import LoadPattern, load_vector
+from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.continuum.lumped_mass import lumped_mass
+from fxcrack.continuum.term import Term
+from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.front import Front
+from fxcrack.interface.lumped import LumpedInterface
+from fxcrack.interface.pairing import Pair, local_frames
+from fxcrack.interface.supports import Supports
+from fxcrack.solvers.explicit_interface import InterfaceDynamics
+from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
+from fxcrack.solvers.explicit_state import (
+    Arrays,
+    InterfaceSnapshot,
+    MotionFiles,
+    MotionSnapshot,
+)
+from fxcrack.solvers.explicit_supports import PrescribedMotion
+from fxcrack.solvers.options import ExplicitOptions
+from fxcrack.solvers.stable_increment import HighestFrequency, rounded_down, start_vector
+
+_INSIDE = 1e-9
+"""Part of the way to the middle of its cells at which a node's first velocity is looked up."""
+
+
+_AGAIN = 6
+"""Lanczos steps that follow a tangent which has changed little."""
+
+
+class ExplicitSolver:
+    """Bodies, interfaces and loads in explicit dynamics.
+
+    Args:
+        continuum: Displacement space; first order.
+        pairs: Interfaces.
+        supports: Prescribed components.
+        loads: Force patterns.
+        monitors: Monitored displacements.
+        terms: What acts in the bodies, all but inertia.
+        effect: Density, damping and velocity at the start.
+
+    Raises:
+        InputError: The bodies are not made for explicit dynamics.
+
+    Attributes:
+        Those of :class:`fxcrack.solvers.base.AnySolver`, and
+        bodies: Internal forces, with the displacement.
+        velocity: In the middle of the last increment, shape (n_local,), length/time.
+        mass: Mass of the owned dofs, scaled, shape (n_local,).
+        added_mass: What mass scaling has added to it, same shape.
+        lumped: Interfaces with lumped masses.
+        dynamics: Motion and forces of the interfaces.
+        dt: Increment, time.
+        stable: Largest stable increment, time.
+        at: Time of the displacement.
+        increments: How many were done.
+        seconds: Seconds per part of an increment.
+    """
+
+    def __init__(
+        self,
+        continuum: Continuum,
+        pairs: list[Pair],
+        supports: Supports,
+        loads: list[Load],
+        monitors: list[Monitor],
+        *,
+        terms: Sequence[Term],
+        effect: Inertia,
+    ) -> None:
+        self.continuum, self.pairs, self.supports = continuum, pairs, supports
+        self.loads, self.monitors = loads, monitors
+        self.effect = effect
+        self.comm = continuum.comm
+        self.timings = Timings()
+        self.fronts = [Front(p.surface, p.bonded, p.title) for p in pairs]
+        self.n_loads = len(supports.columns) + len(loads)
+        self.active = [False] * len(pairs)
+        self.around = [(0.0, 0.0)] * len(pairs)
+        self.bodies = InternalForces(continuum, terms)
+        n, gdim = continuum.n_local, continuum.gdim
+        self._bare_mass = lumped_mass(continuum, effect)
+        self.mass, self.added_mass = self._bare_mass.copy(), np.zeros(n)
+        self._per_mass = 1.0 / self.mass
+        self._mass_is_scaled = False
+        self.velocity = self._starting_velocity()
+        self.at, self.increments = 0.0, 0
+        self.dt = self.stable = self.last_dt = 0.0
+        self.options = ExplicitOptions()
+        self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
+        self._damping = float(effect.rayleigh[0])
+        self._damped = 0.0  # energy, this rank's part
+        self._work = 0.0  # of supports and loads, this rank's part
+        self.initial_energy = 0.0
+        self.monitored: list[float] = []
+        self._patterns = [self._pattern(load) for load in loads]
+        self._watched = [self._monitor(m) for m in monitors]
+        self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass)
+        self._make_interfaces()
+        self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
+        self._force = np.zeros(n)
+        self._files = MotionFiles(continuum)
+        zero = np.zeros(self.lumped.n_rows * gdim)
+        self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
+
+    # -- what does not change ------------------------------------------------------------
+
+    def _make_interfaces(self) -> None:
+        lumped, gdim = self.lumped, self.continuum.gdim
+        nodes = lumped.nodes
+        self.row_of = lumped.row_of
+        self.frames, self.held_by_supports = lumped.pair_frames, lumped.pair_held
+        for pair, front, held in zip(self.pairs, self.fronts, self.held_by_supports, strict=True):
+            front.tied = held.all(axis=1) | (pair.bonded & ~pair.paired)
+        self.index = []
+        for rows, held in zip(self.row_of, self.held_by_supports, strict=True):
+            numbers = gdim * rows[:, None] + np.arange(gdim)
+            self.index.append(np.where((rows >= 0)[:, None] & ~held, numbers, -1))
+        tied = np.zeros(lumped.n_rows, dtype=bool)
+        for front, rows in zip(self.fronts, self.row_of, strict=True):
+            has = rows >= 0
+            tied[rows[has]] = front.bonded[has]
+        self.dynamics = InterfaceDynamics(lumped, self.pairs, tied)
+        self._mine = nodes.mine
+        self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
+        self._any_held = bool(lumped.held.any())
+        self.bonds = np.zeros((lumped.n_rows + 1, gdim))
+        self.jumps = np.zeros((lumped.n_rows + 1, gdim))
+        self.face_loads: Array | None = None
+        self._face_patterns: list[Array] = []
+        n = self.continuum.n_local
+        found = [nodes.gather(p.dense(n))[lumped.slave] for p in self._patterns]
+        if any(np.any(f) for f in found):
+            self._face_patterns = found
+            self.face_loads = np.zeros_like(self.bonds)
+        self.dynamics.v = nodes.gather(self.velocity)
+
+    def _starting_velocity(self) -> Array:
+        velocity, gdim = self.effect.velocity, self.continuum.gdim
+        out = np.zeros((self.continuum.layout.n_owned, gdim))
+        if velocity is None:
+            return out.ravel()
+        if len(velocity) != gdim:
+            raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
+        x = self._places_within().T
+        for c, value in enumerate(velocity):
+            out[:, c] = value(x) if callable(value) else float(value)
+        return out.ravel()
+
+    def _places_within(self) -> Array:
+        """Positions of the owned nodes, by a trifle inside their own body, shape (n, 3).
+
+        The two nodes at one place of an interface belong to bodies that may move differently.
+        """
+        x, cells = self.continuum.positions(), self.continuum.space.dofmap.list
+        middle, count = np.zeros_like(x), np.zeros(len(x))
+        np.add.at(middle, cells, x[cells].mean(axis=1)[:, None])
+        np.add.at(count, cells, 1.0)
+        n = self.continuum.layout.n_owned
+        inside = middle[:n] / np.maximum(count[:n], 1.0)[:, None]
+        return np.asarray(x[:n] + _INSIDE * (inside - x[:n]))
+
+    def _pattern(self, load: Any) -> LoadPattern:
+        vector = load_vector(self.continuum, load)
+        out = LoadPattern(np.array(vector.array_r))
+        vector.destroy()
+        return out
+
+    def _monitor(self, monitor: Monitor) -> LoadPattern:
+        continuum = self.continuum
+        if len(monitor.direction) != continuum.gdim:
+            raise InputError(
+                f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
+                f"{continuum.gdim} are needed"
+            )
+        nodes = continuum.owned_nodes(monitor.where)
+        count = self.comm.allreduce(len(nodes))
+        mean = np.zeros(continuum.n_local)
+        for i, component in enumerate(monitor.direction):
+            mean[continuum.layout.dof(nodes, i)] = component / count
+        return LoadPattern(mean)
+
+    # -- a step begins -------------------------------------------------------------------
+
+    def prepare(self, options: ExplicitOptions, active: list[bool], coordinates: Array) -> None:
+        """Choose operator, mass and increment for a step; collective.
+
+        Args:
+            options: Controls of the step.
+            active: Interfaces that may grow in the step.
+            coordinates: Amplitudes of supports and load factors at the start, shape (n_loads,).
+
+        Raises:
+            InputError: The increment asked for is not stable.
+        """
+        start = clock.perf_counter()
+        self.options, self.active = options, active
+        self.bodies.choose(options.operator)
+        self.timings.add("operator", start)
+        start = clock.perf_counter()
+        if isinstance(options.mass_scale, str):
+            assert options.dt is not None
+            self.set_mass(self._mass_for(options.dt))
+        elif options.mass_scale != 1.0 or self._mass_is_scaled:
+            self.set_mass(options.mass_scale * self._bare_mass)
+        self.stable = self._stable_increment()
+        self.dt = options.safety * self.stable
+        if options.dt is not None:
+            if options.dt > self.stable:
+                raise InputError(
+                    f"Explicit: dt = {options.dt:g} is above the largest stable increment "
+                    f"{self.stable:g}; leave dt out, or let mass be added with mass_scale='dt'"
+                )
+            self.dt = float(options.dt)
+        self.timings.add("stable increment", start)
+        self.dynamics.penalty = options.penalty if options.contact == "penalty" else None
+        if self.increments == 0:
+            self._start(coordinates)
+
+    def _mass_for(self, dt: float) -> Array:
+        """Masses for which an increment is stable, shape (n_local,); collective.
+
+        Nodes get as much as Gershgorin's circles ask for, sum_j |K_ij|/m_i <= (2/dt)^2, which is
+        more than needed but leaves all other nodes alone.
+        """
+        sums = np.asarray(abs(self.bodies.stiffness()).sum(axis=1)).ravel()
+        by_node = self.continuum.layout.by_node(sums).max(axis=1)
+        needed = np.repeat(0.25 * (1.0 + 1e-9) * dt**2 * by_node, self.continuum.gdim)
+        return np.maximum(self._bare_mass, needed)
+
+    def set_mass(self, mass: Array) -> None:
+        """Take another mass of the owned dofs, shape (n_local,)."""
+        self.mass, self.added_mass, self._mass_is_scaled = mass, mass - self._bare_mass, True
+        self._per_mass = 1.0 / mass
+        lumped = self.lumped
+        lumped.mass = lumped.nodes.gather(mass)[:, 0]
+        self.dynamics.set_ties(lumped.tied)
+
+    def _stable_increment(self) -> float:
+        places = self.continuum.positions()[: self.continuum.layout.n_owned]
+        start = start_vector(places, self.continuum.gdim)
+        self._highest = HighestFrequency(self.comm, self.mass, start)
+        return rounded_down(2.0 / self._highest(self.bodies.tangent_product))
+
+    def follow_bodies(self) -> None:
+        """Take front geometry and contact normals of bodies that move far; collective."""
+        lumped, gdim = self.lumped, self.continuum.gdim
+        for p, (front, rows) in enumerate(zip(self.fronts, self.row_of, strict=True)):
+            x = self.pairs[p].surface.x.copy()
+            has = rows >= 0
+            x[has, :gdim] += self.dynamics.u[lumped.slave[rows[has]]]
+            front.follow(x)
+            frames = local_frames(-front.surface.normals, gdim)
+            lumped.frames[rows[has]] = frames[has]
+        self.dynamics.set_ties(lumped.tied)
+
+    def renew_stable_increment(self) -> float:
+        """The stable increment with the present tangent, by a few more steps; collective."""
+        self.stable = rounded_down(2.0 / self._highest(self.bodies.tangent_product, _AGAIN))
+        return self.stable
+
+    def set_displacement(self, owned: Array) -> None:
+        """Begin with a displacement of the owned dofs, shape (n_local,), length; collective."""
+        x = self.bodies.u.x
+        x.array[: self.continuum.n_local] = owned
+        x.scatter_forward()
+
+    def _start(self, coordinates: Array) -> None:
+        """Displacements that supports prescribe from the first moment, and the first energies."""
+        u = self.bodies.u.x.array
+        fixed = np.flatnonzero(self.supports.which >= 0)
+        u[fixed] = self.supports.value[fixed] * coordinates[self.supports.which[fixed]]
+        self.bodies.u.x.scatter_forward()
+        self.dynamics.u = self.lumped.nodes.gather(u[: self.continuum.n_local])
+        self.lumped.follow(self.dynamics.v)
+        self.initial_energy = sum(self.stored_now().values())
+
+    # -- one increment -------------------------------------------------------------------
+
+    def begin(self, now: Array, then: Array) -> None:
+        """Forces and accelerations at the present displacement; collective.
+
+        Args:
+            now: Coordinates of support columns, then load factors, at present, shape (n_loads,).
+            then: The same at the end of the increment.
+        """
+        t0 = clock.perf_counter()
+        columns = len(self.supports.columns)
+        self._h = 0.5 * (self.last_dt + self.dt)
+        self._now, self._loads, self._coordinates = now, now[columns:], then[:columns]
+        loads = self._loads
+        force = np.negative(self.bodies.forces())
+        if not self.increments:
+            self._first = -force
+        for pattern, factor in zip(self._patterns, loads.tolist(), strict=True):
+            if factor:
+                pattern.add(force, factor)
+        if self._damping:
+            force -= self._damping * self.mass * self.velocity
+        self._force = force
+        t1 = clock.perf_counter()
+        nodes = self.lumped.nodes
+        if len(nodes):
+            self._at_nodes = nodes.gather(force)
+            self.accelerate()
+        t2 = clock.perf_counter()
+        self.seconds["internal forces"] += t1 - t0
+        self.seconds["interface"] += t2 - t1
+
+    def accelerate(self) -> None:
+        """Accelerations of the interface nodes and bond forces, with the present ties."""
+        dynamics, lumped = self.dynamics, self.lumped
+        dynamics.accelerate(self._at_nodes.copy(), self._coordinates, self._h, self.dt)
+        rows, forces = lumped.bond_forces(dynamics.a, dynamics.total)
+        if self._any_held:
+            forces = self._without_supports(rows, forces)
+        self.bonds[lumped.open] = 0.0
+        self.bonds[rows] = forces
+        self.jumps[lumped.open] = dynamics.gap
+        if self.face_loads is not None:
+            self.face_loads[:-1] = sum(
+                factor * f
+                for factor, f in zip(self._loads.tolist(), self._face_patterns, strict=True)
+            )
+
+    def _without_supports(self, rows: Ints, forces: Array) -> Array:
+        """Bond forces without the components that supports hold, which are their reactions."""
+        frames = self.lumped.frames[rows]
+        local = np.einsum("nci,nc->ni", frames, forces)
+        local[self.lumped.held[rows]] = 0.0
+        return np.asarray(np.einsum("nci,ni->nc", frames, local))
+
+    def finish(self) -> None:
+        """Move the bodies to the end of the increment; collective."""
+        start = clock.perf_counter()
+        h, dt, v, a = self._h, self.dt, self.velocity, self._force
+        n = self.continuum.n_local
+        u = self.bodies.u.x.array[:n]
+        prescribed, dynamics = self.prescribed, self.dynamics
+        reactions = self.reactions()
+        acting = [
+            (factor, p, p.values @ v[p.at])
+            for p, factor in zip(self._patterns, self._loads.tolist(), strict=True)
+            if factor
+        ]
+        if self._damping:
+            before = v.copy()
+        old = prescribed.motion(v, dynamics.v)
+        a *= self._per_mass
+        if len(self._at_interface):
+            a[self._at_interface] = dynamics.a[self._mine].ravel()
+        a *= h
+        if not self.increments:
+            begun = v.copy()
+        v += a
+        v[prescribed.dofs] = prescribed.velocities(u, self._coordinates, dt)
+        dynamics.advance(h, dt)
+        self._work += 0.5 * h * float(reactions @ (old + prescribed.motion(v, dynamics.v)))
+        for factor, pattern, power in acting:
+            self._work += 0.5 * h * factor * float(power + pattern.values @ v[pattern.at])
+        if self._damping:
+            self._damped += 0.5 * h * self._damping * float((before * self.mass) @ (before + v))
+        if not self.increments:
+            # the strain energy of the first half increment looks ahead to the whole of it
+            self.initial_energy += self._sum(0.25 * dt * float(self._first @ (v - begun)))[0]
+        np.multiply(v, dt, out=a)
+        u += a
+        if self.comm.size > 1:
+            self.bodies.u.x.scatter_forward()
+        self.at += dt
+        self.last_dt = dt
+        self.increments += 1
+        self.seconds["update"] += clock.perf_counter() - start
+
+    def reactions(self) -> Array:
+        """Reactions of the prescribed dofs of this rank, in the order of :attr:`prescribed`.
+
+        Between :meth:`begin` and :meth:`finish`. Shape (n_prescribed,), force.
+        """
+        prescribed, n = self.prescribed, self.continuum.n_local
+        u, dofs = self.bodies.u.x.array[:n], self.prescribed.dofs
+        speed = prescribed.velocities(u, self._coordinates, self.dt)
+        within = self.mass[dofs] * (speed - self.velocity[dofs]) / self._h - self._force[dofs]
+        return np.concatenate([within, prescribed.at_nodes(self.lumped, self.dynamics)])
+
+    # -- energies ------------------------------------------------------------------------
+
+    def _sum(self, *parts: float) -> list[float]:
+        """Sums over ranks; collective."""
+        values = np.array(parts, dtype=float)  # bincount of nothing gives integers
+        if self.comm.size > 1:
+            self.comm.Allreduce(MPI.IN_PLACE, values)
+        return [float(x) for x in values]
+
+    def stored_now(self) -> dict[str, float]:
+        """Strain and kinetic energy in the middle of the last increment; collective.
+
+        Before the first increment they are those of the start.
+        """
+        v, dt, n = self.velocity, self.last_dt, self.continuum.n_local
+        bodies = self.bodies
+        square = v * v
+        kinetic, added = 0.5 * float(self.mass @ square), 0.5 * float(self.added_mass @ square)
+        now = bodies.u.x.array[:n].copy()
+        if bodies.linear:
+            strain = 0.5 * float((now - dt * v) @ bodies.forces())
+        else:
+            strain = 0.0
+            force = bodies.forces().copy()
+            energy = bodies.stored()
+            if dt > 0.0:
+                bodies.u.x.array[:n] = now - dt * v
+                bodies.u.x.scatter_forward()
+                energy = 0.5 * (energy + bodies.stored())
+                strain = -0.25 * dt * float((force - bodies.forces()) @ v)
+                bodies.u.x.array[:n] = now
+                bodies.u.x.scatter_forward()
+            strain += energy / self.comm.size
+        strain, kinetic, added = self._sum(strain, kinetic, added)
+        kinetic += self.lumped.excess_energy(self.dynamics.v)
+        out = {"strain_energy": strain, "kinetic_energy": kinetic}
+        if self._mass_is_scaled:
+            out["mass_scaling_energy"] = added
+        return out
+
+    def stored(self, state: Equilibrium) -> dict[str, float]:
+        """Energies stored in the bodies, by name, of the present state; collective."""
+        return self.stored_now()
+
+    def spent(self) -> dict[str, float]:
+        """Energies that have left the bodies, by name; collective."""
+        energies = self.dynamics.energies
+        out = {"released_energy": energies.bonds}
+        if any(pair.interface.contact for pair in self.pairs):
+            out["contact_energy"] = energies.contact
+        if any(pair.friction is not None for pair in self.pairs):
+            out["friction_energy"] = energies.friction
+        if not self.lumped.simple:
+            out["tie_energy"] = energies.ties
+        if self._damping:
+            out["damping_energy"] = self._sum(self._damped)[0]
+        return out
+
+    def external_work(self) -> float:
+        """Work of supports and loads up to the middle of the last increment; collective."""
+        return self._sum(self._work)[0]
+
+    # -- going back, and checkpoints -----------------------------------------------------
+
+    def remember(self) -> MotionSnapshot:
+        """What :meth:`recall` needs to return to the start of this increment; collective."""
+        n = self.continuum.n_local
+        work, damped = self._sum(self._work, self._damped)
+        return MotionSnapshot(
+            self.bodies.u.x.array[:n].copy(), self.velocity.copy(),
+            InterfaceSnapshot.of(self.dynamics), self.at, self.last_dt,
+            (work, damped, self.initial_energy), self.increments,
+        )  # fmt: skip
+
+    def recall(self, saved: MotionSnapshot) -> None:
+        """Return to the start of an earlier increment; fronts are the caller's. Collective."""
+        n, x = self.continuum.n_local, self.bodies.u.x
+        x.array[:n] = saved.u
+        x.scatter_forward()
+        self.velocity[:] = saved.v
+        self.at, self.last_dt, self.increments = saved.at, saved.last_dt, saved.increments
+        first = self.comm.rank == 0
+        self._work, self._damped = (s if first else 0.0 for s in saved.sums[:2])
+        self.initial_energy = saved.sums[2]
+        self.dynamics.u = self.lumped.nodes.gather(x.array[:n])
+        self.dynamics.v = self.lumped.nodes.gather(self.velocity)
+        saved.interfaces.restore(self.dynamics)
+        if hasattr(self, "_now"):
+            columns = len(self.supports.columns)
+            self.begin(self._now, np.append(self._coordinates, self._now[columns:]))
+
+    def collect(self) -> Arrays:
+        """The state at the start of this increment as plain arrays; collective.
+
+        Returns:
+            displacement, velocity and positions of all nodes in the order of the input, on rank 0;
+            bonds and energies of the interfaces by row; bonded[p], shape (n_nodes,), and jump[p],
+            shape (n_nodes, gdim), per pair; loads, shape (n_loads,).
+        """
+        self.record_state()
+        saved = self.remember()
+        out: Arrays = {
+            "displacement": self._files.gather(saved.u),
+            "velocity": self._files.gather(saved.v),
+            "positions": self._files.positions(),
+            "motion": np.array([saved.at, saved.last_dt, *saved.sums, saved.increments]),
+            "loads": self.state.loads,
+        }
+        out |= {f"interfaces.{k}": v for k, v in saved.interfaces.arrays().items()}
+        for p, (front, index) in enumerate(zip(self.fronts, self.index, strict=True)):
+            out[f"bonded[{p}]"] = front.bonded
+            out[f"jump[{p}]"] = np.append(self.state.jump, 0.0)[index]
+        return out
+
+    def resume(self, arrays: Arrays, time: float) -> None:
+        """Take a state that :meth:`collect` gave; collective.
+
+        Args:
+            arrays: By name, of the shapes that :meth:`collect` gave.
+            time: Time of the state.
+
+        Raises:
+            InputError: The arrays do not fit the mesh.
+        """
+        self._files.check_positions(arrays["positions"])
+        at, last_dt, *sums, increments = arrays["motion"].astype(float).tolist()
+        part = {k.removeprefix("interfaces."): v for k, v in arrays.items() if "interfaces." in k}
+        for p, front in enumerate(self.fronts):
+            gone = front.bonded & ~arrays[f"bonded[{p}]"].astype(bool)
+            if gone.any():
+                front.release(np.flatnonzero(gone))
+        self.recall(
+            MotionSnapshot(
+                self._files.scatter(arrays["displacement"]),
+                self._files.scatter(arrays["velocity"]),
+                InterfaceSnapshot.from_arrays(part), at, last_dt,
+                (sums[0], sums[1], sums[2]), int(increments),
+            )
+        )  # fmt: skip
+
+    # -- what criteria and output ask ----------------------------------------------------
+
+    def record_state(self) -> None:
+        """Take the present loads, reactions, jumps and forces as :attr:`state`; collective."""
+        lumped, columns = self.lumped, len(self.supports.columns)
+        u = self.bodies.u.x.array[: self.continuum.n_local]
+        reactions = self.prescribed.by_column(self.reactions(), columns)
+        conjugate = [*reactions.tolist(), *(float(p.values @ u[p.at]) for p in self._patterns)]
+        monitors = [float(p.values @ u[p.at]) for p in self._watched]
+        sums = self._sum(*conjugate, *monitors)
+        self.monitored = sums[len(conjugate) :]
+        jumps = np.einsum("nci,nc->ni", lumped.frames, self.jumps[:-1])
+        force = np.zeros_like(jumps)
+        force[lumped.open] = self.dynamics.open_forces()
+        force = np.einsum("nci,nc->ni", lumped.frames, force)
+        self.state = Equilibrium(
+            self._now, force.ravel(), jumps.ravel(), np.array(sums[: len(conjugate)])
+        )
+
+    def about(self) -> dict[str, Any]:
+        """What is worth keeping with a history, plain types."""
+        choice = self.bodies.choice
+        return {
+            "increments": self.increments,
+            "dt": self.dt,
+            "stable_increment": self.stable,
+            "operator": choice.name,
+            "operator_reason": choice.why,
+            "increment_seconds": dict(self.seconds),
+        }
+
+    def probe(self, p: int) -> ExplicitFrontProbe:
+        """What criteria may ask of a pair."""
+        return ExplicitFrontProbe(self, p)
+
+    def holds(self, p: int, nodes: Ints) -> bool:
+        """Whether all of some slave nodes, shape (n,), have a jump, or no master."""
+        return bool(np.all((self.row_of[p][nodes] >= 0) | ~self.pairs[p].paired[nodes]))
+
+    def remaining(self, p: int) -> tuple[Ints, Array]:
+        """Slave nodes of a pair that soften, and the remaining fraction of the force at each."""
+        rows, bonds = self.row_of[p], self.dynamics.bonds
+        nodes = np.flatnonzero(rows >= 0)
+        nodes = nodes[bonds.active[rows[nodes]]]
+        at = rows[nodes]
+        top, one = bonds.top[at], np.ones(len(at))
+        back = np.divide(bonds.low[at], top, out=one, where=top > 0.0)
+        return nodes, (1.0 - top / bonds.final[at]) * np.clip(back, 0.0, 1.0)
+
+    def vectors(self, p: int, nodes: Ints, values: Array) -> Array:
+        """Jump or force components at slave nodes, shape (...,), as global vectors.
+
+        Args:
+            p: Number of the pair.
+            nodes: Slave nodes.
+            values: Values of the numbered jumps, shape (n_jumps,).
+
+        Returns:
+            Shape (..., 3).
+        """
+        index = self.index[p][nodes]
+        local = np.where(index >= 0, np.append(values, 0.0)[index], 0.0)
+        out = np.zeros((*index.shape[:-1], 3))
+        out[..., : self.continuum.gdim] = np.einsum(
+            "...ck,...k->...c", self.frames[p][nodes], local
+        )
+        return out
+
+    def displacements_of(self, where: list[Ints]) -> Array:
+        """Mean displacements of sets of owned nodes, shape (n_sets, gdim); collective."""
+        u = self.continuum.layout.displacements(self.bodies.u.x.array[: self.continuum.n_local])
+        sums = [[*u[nodes].sum(axis=0), len(nodes)] for nodes in where]
+        flat = np.array(self._sum(*np.ravel(sums))).reshape(len(where), -1)
+        return np.asarray(flat[:, :-1] / flat[:, -1:])
+
+    def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Present displacement; collective; the caller destroys it."""
+        vector = PETSc.Vec().createMPI((self.continuum.n_local, self.continuum.n_global), self.comm)
+        vector.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
+        return vector
+
+    def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
+        """Forces of interfaces and supports on the bodies; the caller destroys them.
+
+        They are what the acceleration needs beyond internal forces and loads, M a - f. Collective,
+        between :meth:`begin` and :meth:`finish`, of the present state alone.
+        """
+        vector = u.duplicate()
+        vector.set(0.0)
+        n, prescribed = self.continuum.n_local, self.prescribed
+        values = np.zeros(n)
+        values[prescribed.dofs] = self.reactions()[: len(prescribed.dofs)]
+        if len(self._at_interface):
+            mine, lumped = self._mine, self.lumped
+            held = lumped.mass[mine, None] * self.dynamics.a[mine] - self._at_nodes[mine]
+            values[self._at_interface] = held.ravel()
+        vector.array[:] = values
+        return vector
+
+    def destroy(self) -> None:
+        """Nothing is kept that must be freed collectively."""

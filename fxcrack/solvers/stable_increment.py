@@ -1,0 +1,94 @@
+"""The stable increment of central differences: 2/omega of the highest frequency.
+
+    omega^2 <= theta + |beta_k s_k|
+
+with theta the largest Ritz value of M^-1/2 K M^-1/2 after k steps of Lanczos' method, beta_k its
+last off-diagonal entry and s_k the last component of the Ritz vector: the residual of the Ritz
+pair, which puts the estimate on the safe side (Parlett, The Symmetric Eigenvalue Problem, 1998,
+section 13.2). The start vector depends on the positions of the nodes alone, and the result is
+rounded down in its tenth digit, so that it does not depend on the number of ranks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from mpi4py import MPI
+
+from fxcrack.base.arrays import Array
+
+STEPS = 24
+"""Lanczos steps; enough for a quarter of a percent on even and uneven meshes."""
+
+
+def start_vector(positions: Array, gdim: int) -> Array:
+    """A vector with a part in every mode, of the positions of nodes alone.
+
+    Args:
+        positions: Of the owned nodes, shape (n, 3), length.
+        gdim: Unknowns of a node.
+
+    Returns:
+        Shape (n gdim,).
+    """
+    place = positions @ np.array([12.9898, 78.233, 37.719])
+    return np.asarray(
+        (np.sin(1e3 * place)[:, None] + np.cos(7e2 * place[:, None] + np.arange(gdim))).ravel()
+    )
+
+
+class HighestFrequency:
+    """Estimates the highest frequency of bodies with lumped mass.
+
+    Args:
+        comm: Communicator of the bodies.
+        mass: Mass of the owned dofs, shape (n_local,).
+        start: Start vector, shape (n_local,).
+    """
+
+    def __init__(self, comm: MPI.Intracomm, mass: Array, start: Array) -> None:
+        self._comm = comm
+        self._root = 1.0 / np.sqrt(mass)
+        self._vector = start
+
+    def __call__(self, product: Callable[[Array], Array], steps: int = STEPS) -> float:
+        """Upper estimate of omega, 1/time; collective.
+
+        The vector that the highest mode is seen in starts the next call.
+
+        Args:
+            product: Tangent stiffness times a vector, shape (n_local,) each.
+            steps: Lanczos steps.
+        """
+        q = self._vector / np.sqrt(self._dot(self._vector, self._vector))
+        last: Array | float = 0.0
+        beta = 0.0
+        diagonal, beside, basis = [], [], []
+        for _ in range(steps):
+            basis.append(q)
+            w = self._root * product(self._root * q) - beta * last
+            alpha = self._dot(w, q)
+            w -= alpha * q
+            beta = float(np.sqrt(self._dot(w, w)))
+            diagonal.append(alpha)
+            beside.append(beta)
+            if beta <= 1e-12 * abs(alpha):
+                break  # an invariant subspace: very few unknowns
+            last, q = q, w / beta
+        matrix = np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1)
+        values, vectors = np.linalg.eigh(matrix)
+        self._vector = sum(s * v for s, v in zip(vectors[:, -1], basis, strict=True))
+        return float(np.sqrt(max(values[-1], 0.0) + abs(beside[-1] * vectors[-1, -1])))
+
+    def _dot(self, x: Array, y: Array) -> float:
+        return float(self._comm.allreduce(float(x @ y), op=MPI.SUM))
+
+
+def rounded_down(value: float) -> float:
+    """A positive number cut after its tenth digit: round-off of sums over ranks is gone."""
+    digits = 9 - int(np.floor(np.log10(value)))
+    return float(np.floor(value * 10.0**digits) / 10.0**digits)
+
+
+__all__ = ["STEPS", "HighestFrequency", "rounded_down", "start_vector"]

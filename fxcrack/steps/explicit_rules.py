@@ -1,0 +1,128 @@
+"""What a scene and a step of explicit dynamics must be like."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from fxcrack.base import log
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.loads import Load, Pressure
+from fxcrack.criteria import VCCT
+from fxcrack.interface.pairing import Interface
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.explicit_release import law_of
+
+
+def inertia_of(effects: Sequence[Any]) -> Inertia:
+    """The inertia of a scene, fit for explicit dynamics.
+
+    Raises:
+        InputError: There is none, or it has damping by stiffness.
+    """
+    found = [e for e in effects if isinstance(e, Inertia)]
+    if not found:
+        raise InputError(
+            "Explicit moves bodies that have inertia, and the scene has none; write "
+            "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
+        )
+    effect: Inertia = found[0]
+    if effect.rayleigh[1]:
+        raise InputError(
+            f"Inertia: rayleigh = {effect.rayleigh}: damping by stiffness would shorten the "
+            "increments of explicit dynamics far more than it damps; use damping by mass, "
+            "rayleigh=(r, 0.0)"
+        )
+    return effect
+
+
+def check_bodies(continuum: Continuum, loads: Sequence[Load]) -> None:
+    """Refuse bodies and loads that explicit dynamics does not have.
+
+    Raises:
+        InputError: Says which, and what to do instead.
+    """
+    if continuum.order != 1:
+        raise InputError(
+            "Explicit needs first-order elements: row sums of second-order ones give corner nodes "
+            "a negative mass; write Scene(..., order=1), or use a Dynamic step"
+        )
+    for material in continuum.part_materials:
+        if getattr(material, "form", "elastic") == "plastic":
+            raise InputError(
+                "Explicit: Plastic is not available in explicit dynamics; use an elastic material, "
+                "or a Dynamic step"
+            )
+    if continuum.temperature is not None:
+        raise InputError(
+            "Explicit: Temperature is not available in explicit dynamics; leave it out, or use a "
+            "Dynamic step"
+        )
+    for load in loads:
+        if isinstance(load, Pressure) and load.follows:
+            raise InputError(
+                f"Explicit: pressure '{load.title}' follows the bodies, which explicit dynamics "
+                "does not have; use follows=False, or a Dynamic step"
+            )
+
+
+def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> None:
+    """Refuse criteria, bonds and release laws that explicit dynamics does not have.
+
+    Args:
+        debonds: Interfaces that may grow in the step.
+        bonds: Interfaces without a criterion.
+
+    Raises:
+        InputError: Says which, and what to do instead.
+    """
+    for debond in debonds:
+        criterion, where = debond.criterion, f"interface '{debond.interface.title}'"
+        name = type(criterion).__name__
+        if not isinstance(criterion, VCCT) or criterion.softens or criterion.grows_in_cycles:
+            raise InputError(
+                f"{where}: {name} is not possible in explicit dynamics, which has VCCT alone; use "
+                "VCCT, or leave the interface out of this step, grow=[other debonds]"
+            )
+        if criterion.method != "vcct":
+            raise InputError(
+                f"{where}: method='{criterion.method}' needs the condensed stiffness of the "
+                "bodies, which explicit dynamics does not have; use method='vcct'"
+            )
+        if criterion.viscosity > 0.0 and law_of(debond).driver != "once":
+            raise InputError(
+                f"{where}: in explicit dynamics viscosity delays a release at once; add "
+                "release=StepRelease(), or use viscosity=0: a progressive release needs none"
+            )
+    for interface in (*[d.interface for d in debonds], *bonds):
+        if interface.normal_only:
+            raise InputError(
+                f"interface '{interface.title}': bonds of explicit dynamics hold in all "
+                "directions; leave normal_only out"
+            )
+    for interface in bonds:
+        if interface.bonded is not None:
+            log.warn(
+                "interface '%s' has a bonded set but no criterion: its bonds stay tied whatever "
+                "they carry; make it a Debond if they may fail",
+                interface.title,
+            )
+
+
+def warn_of_step_release(debonds: Sequence[Debond]) -> None:
+    """Warn where bonds are released at once: then a running crack does not measure toughness."""
+    for debond in debonds:
+        law = law_of(debond)
+        if law.driver == "once" and not debond.criterion.viscosity > 0.0:
+            log.warn(
+                "interface '%s': StepRelease in explicit dynamics lets a node go at once, which "
+                "overshoots in force and opening by up to 2 each; a crack that runs passes "
+                "through up to three times its toughness. It is meant for comparison with other "
+                "programs: use ProgressiveRelease() (the default) otherwise",
+                debond.interface.title,
+            )
+
+
+__all__ = ["check_bodies", "check_interfaces", "inertia_of", "warn_of_step_release"]

@@ -1,0 +1,91 @@
+"""The solver of explicit dynamics in place of the one a scene was made with."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.loads import Load
+from fxcrack.continuum.term import Term
+from fxcrack.interface.supports import warn_of_held_bonds
+from fxcrack.solvers.explicit import ExplicitSolver
+from fxcrack.solvers.plan import Plan
+from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.explicit import Explicit
+from fxcrack.steps.explicit_rules import check_bodies, inertia_of
+
+
+def use_explicit_solver(
+    analysis: Analysis, loads: Sequence[Load], terms: Callable[[Continuum], Sequence[Term]]
+) -> None:
+    """Give an analysis that has not begun the solver of explicit dynamics; collective.
+
+    Args:
+        analysis: The analysis; nothing happens where it has that solver already.
+        loads: Loads of the scene.
+        terms: Makes the terms of the bodies, all but inertia.
+
+    Raises:
+        InputError: Bodies or effects are not made for it, or other steps were run before.
+    """
+    effect = inertia_of(analysis.effects)
+    old = analysis.solver
+    if isinstance(old, ExplicitSolver):
+        return
+    if analysis.started:
+        raise InputError(
+            "Explicit: this scene has run other steps before, from which explicit dynamics cannot "
+            "go on; make another scene for it, scene.rebuilt()"
+        )
+    check_bodies(analysis.continuum, loads)
+    solver = ExplicitSolver(
+        analysis.continuum, analysis.pairs, old.supports, old.loads, old.monitors,
+        terms=terms(analysis.continuum), effect=effect,
+    )  # fmt: skip
+    old.destroy()
+    analysis.solver = solver
+    why = ("the step is explicit: central differences, nothing is factored",)
+    effects = tuple(e for e in analysis.plan.effects if "inertia" not in e)
+    analysis.plan = Plan("explicit", why, (*effects, "inertia: explicit dynamics"))
+
+
+def prepare_explicit(
+    analysis: Analysis, step: Explicit, may_grow: list[bool], *, resumes: bool
+) -> None:
+    """Choose operator and increment, and take the state to begin with; collective.
+
+    Args:
+        analysis: The analysis.
+        step: Controls of the step.
+        may_grow: Per interface, whether its crack may grow.
+        resumes: Whether the state was taken from a checkpoint.
+    """
+    solver = analysis.solver
+    assert isinstance(solver, ExplicitSolver)
+    if not analysis.started:
+        for pair, held in zip(analysis.pairs, solver.held_by_supports, strict=True):
+            warn_of_held_bonds(pair, held)
+    now = analysis.loads_at(analysis.time)
+    solver.prepare(step.options, may_grow, now)
+    if resumes:
+        solver.begin(now, now)
+        solver.record_state()
+    analysis.started = True
+
+
+def start_from(analysis: Analysis, still: Analysis) -> None:
+    """Begin explicit dynamics in a static equilibrium; collective.
+
+    Args:
+        analysis: The analysis, which has not begun.
+        still: An analysis of the same bodies on the same mesh, in equilibrium.
+    """
+    solver = analysis.solver
+    assert isinstance(solver, ExplicitSolver)
+    vector = still.solver.displacement()
+    solver.set_displacement(vector.array_r)
+    vector.destroy()
+
+
+__all__ = ["prepare_explicit", "start_from", "use_explicit_solver"]
