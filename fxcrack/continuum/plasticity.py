@@ -30,6 +30,10 @@ from fxcrack.continuum.term import Term, parts_of
 
 Ints = npt.NDArray[np.int32]
 
+_NEUTRAL = 1e-12
+"""Stresses that exceed the yield stress by less than this part of it are on the yield surface: such
+points are elastic, whatever round-off says."""
+
 
 class Plasticity(Term):
     """The parts of a continuum made of :class:`fxcrack.Plastic`.
@@ -280,7 +284,8 @@ class PlasticPart:
         levels = three_mu * self._knots + self._yield
         target = q + three_mu * self.equivalent
         now = three_mu * self.equivalent + self._stress_at(self.equivalent)
-        flows = target > now
+        # points that stay where they are on the yield surface are there to round-off
+        flows = target > now * (1.0 + _NEUTRAL)
         k = np.maximum(np.searchsorted(levels, target, side="right") - 1, 0)
         p = self._knots[k] + (target - levels[k]) / (three_mu + self._slopes[k])
         dp = np.where(flows, p - self.equivalent, 0.0)

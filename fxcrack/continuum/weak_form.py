@@ -40,6 +40,7 @@ class WeakForm:
     Attributes:
         u: Present (trial) displacement.
         seconds: Seconds spent on each term, updating and assembling.
+        began: End and length of the present increment, time.
     """
 
     def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
@@ -48,6 +49,7 @@ class WeakForm:
         self._order = FileOrder(continuum.mesh.domain)
         self.u = fem.Function(continuum.space, name="displacement")
         self.seconds: dict[str, float] = {}
+        self.began = 0.0, 0.0
         # one residual and one tangent per term, so that the cost of each can be measured
         self._forms: list[tuple[Term, Any, Any]] = []
         self._energies: dict[str, Any] = {}
@@ -210,6 +212,7 @@ class WeakForm:
 
     def begin(self, time_end: float, dt: float) -> None:
         """An increment of dt ends at a time; collective."""
+        self.began = time_end, dt
         for term in self.terms:
             term.begin(time_end, dt)
             term.update(self.u)
@@ -221,8 +224,20 @@ class WeakForm:
             term.commit(self.u)
             self._add(term.name, start)
 
-    def state(self) -> dict[str, Array]:
+    def snapshot(self) -> dict[str, Array]:
+        """Present displacement and committed state of the terms on this rank, as copies.
+
+        Returns:
+            Arrays by name, as :meth:`state` takes them.
+        """
+        return {k: np.array(v) for k, v in self._local().items() if k != "positions"}
+
+    def state(self, local: dict[str, Array] | None = None) -> dict[str, Array]:
         """Committed state: positions, displacement and the state of the terms; collective.
+
+        Args:
+            local: The parts of this rank from an earlier :meth:`snapshot`; the present ones if not
+                given.
 
         Returns:
             On rank 0 fields in the order of :class:`FileOrder`, shape (n_nodes or n_cells, values
@@ -232,7 +247,7 @@ class WeakForm:
         places = self._places()
         return {
             name: self._order.gather(values, places[name]) if name in places else values
-            for name, values in self._local().items()
+            for name, values in {**self._local(), **(local or {})}.items()
         }
 
     def restore(self, state: dict[str, Array]) -> None:
@@ -259,10 +274,14 @@ class WeakForm:
                 "the checkpoint does not fit: its mesh has the same cells in another order, or "
                 "nodes elsewhere. Give the mesh it was written with, or run without restart"
             )
-        self.u.x.array[:] = mine["displacement"]
+        self.reset(mine)
+
+    def reset(self, local: dict[str, Array]) -> None:
+        """Return to a state of this rank from :meth:`snapshot`; collective."""
+        self.u.x.array[:] = local["displacement"]
         for i, term in enumerate(self.terms):
             start = f"{i}."
-            term.restore({k[len(start) :]: v for k, v in mine.items() if k.startswith(start)})
+            term.restore({k[len(start) :]: v for k, v in local.items() if k.startswith(start)})
             term.update(self.u)
 
     def _local(self) -> dict[str, Array]:

@@ -27,7 +27,7 @@ from fxcrack.equilibrium.cohesive_bonds import CohesiveCounts
 from fxcrack.equilibrium.cohesive_law import CohesiveBond, CohesiveUnit
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.friction_state import release_to_contact
-from fxcrack.equilibrium.interface_state import InterfaceState, allow_contact
+from fxcrack.equilibrium.interface_state import Arrays, InterfaceState, allow_contact
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 from fxcrack.interface.pairing import Pair
@@ -121,6 +121,8 @@ class InterfaceSolver(ABC):
         self._cost: CostModel | ColumnCost = CostModel.guess(continuum.n_global, gdim)
         self._followed: list[Ints] = []
         self._resumed: InterfaceState | None = None
+        self._roles: Roles = []
+        self._resumed_roles: Roles | None = None
 
     # -- the retained jumps --------------------------------------------------------------
 
@@ -186,14 +188,38 @@ class InterfaceSolver(ABC):
         self.state, self.friction_energy = saved.equilibrium, saved.friction_energy
         self.overlap_energy = saved.overlap_energy
 
-    def _resume(self, state: InterfaceState) -> None:
-        """Take a state that the next :meth:`prepare` carries over."""
+    def collect(self) -> Arrays:
+        """The present state as plain arrays; collective.
+
+        Returns:
+            What :meth:`InterfaceState.arrays` gives; roles[p], which jumps are retained, per pair,
+            shape (n_nodes, gdim).
+        """
+        roles = {f"roles[{p}]": role for p, role in enumerate(self._roles)}
+        return self.interface_state().arrays() | roles
+
+    def resume(self, arrays: Arrays, time: float) -> None:
+        """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
+
+        Collective.
+
+        Args:
+            arrays: By name, of the shapes that :meth:`collect` gave; the same on all ranks, of any
+                number of ranks.
+            time: Time of the state.
+        """
+        state = InterfaceState.from_arrays(arrays, len(self.pairs))
         state.restore_bonds(self.fronts)
         self._resumed = state
+        names = [f"roles[{p}]" for p in range(len(self.pairs))]
+        if all(name in arrays for name in names):
+            # the set it had, so that the history goes on on the same one
+            self._resumed_roles = [arrays[name].astype(np.int8) for name in names]
 
     def _retain(self, state: InterfaceState) -> None:
         """Condense onto another set of retained jumps, and carry a state over."""
-        roles = self._choose_roles(state)
+        roles = self._resumed_roles or self._choose_roles(state)
+        self._roles, self._resumed_roles = roles, None
         contact_steps = self.system.contact_steps
         coordinates, self.system, self.face_loads = self._condense(roles, state.equilibrium.loads)
         self.frames, self.index = coordinates.frames, coordinates.index

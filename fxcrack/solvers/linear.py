@@ -27,7 +27,7 @@ from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, work_between
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
-from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
+from fxcrack.equilibrium.interface_state import InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
@@ -220,19 +220,6 @@ class LinearSolver(InterfaceSolver):
     def recall(self, saved: InterfaceState) -> None:
         """Return to an earlier state on the same retained jumps."""
         self.restore_interfaces(saved)
-
-    def collect(self) -> Arrays:
-        """The present state as plain arrays; names and shapes: :meth:`InterfaceState.arrays`."""
-        return self.interface_state().arrays()
-
-    def resume(self, arrays: Arrays, time: float) -> None:
-        """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
-
-        Args:
-            arrays: By name, of the shapes that :meth:`collect` gave.
-            time: Time of the state; linear bodies do not use it.
-        """
-        self._resume(InterfaceState.from_arrays(arrays, len(self.pairs)))
 
     # -- energies and fields -------------------------------------------------------------
 

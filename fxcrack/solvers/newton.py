@@ -23,7 +23,7 @@ from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
-from fxcrack.interface.jump_coordinates import build_coordinates
+from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
@@ -139,6 +139,7 @@ class NewtonSolver(InterfaceSolver):
         self._last: IncrementWork | None = None  # of the last trial that was confirmed
         self._energies: dict[str, float] | None = None  # of the accepted state, once asked for
         self._resumed_dense: _Dense | None = None
+        self._resumed_origin: tuple[dict[str, Array], tuple[float, float]] | None = None
 
     # -- condensation --------------------------------------------------------------------
 
@@ -152,7 +153,11 @@ class NewtonSolver(InterfaceSolver):
         )
         self.timings.add("transform", start)
         self.bodies.set(self.u)
-        tangent.condense(coordinates)
+        if self._resumed_origin is not None:
+            self._condense_again(coordinates, *self._resumed_origin)
+            self._resumed_origin = None
+        else:
+            tangent.condense(coordinates)
         system = ContactSystem(
             tangent.condensation.schur, coordinates.n_retained, self.n_loads, n_forces,
             offset=np.zeros(coordinates.n_last),
@@ -163,6 +168,21 @@ class NewtonSolver(InterfaceSolver):
         residual.destroy()
         face_loads = -tangent.condensation.borders_on_retained[:, :n_forces]
         return Condensed(coordinates, system, face_loads)
+
+    def _condense_again(
+        self, coordinates: JumpCoordinates, origin: dict[str, Array], began: tuple[float, float]
+    ) -> None:
+        """Make the tangent that a checkpoint was written with where it was made; collective.
+
+        Bodies that depend on their history have another one in the accepted state.
+        """
+        accepted = self.bodies.snapshot()
+        self.bodies.begin(*began)
+        self.bodies.restore(origin)
+        self.tangent.condense(coordinates)
+        if not self.bodies.dynamic:
+            self.bodies.begin(self.at, 0.0)
+        self.bodies.reset(accepted)
 
     def _equilibrium(self, before: InterfaceState, force: Array) -> Equilibrium:
         jump = self.interfaces.jumps(self.u, self.tangent.coordinates)
@@ -458,13 +478,15 @@ class NewtonSolver(InterfaceSolver):
         """The accepted state as plain arrays; collective.
 
         Returns:
-            What :meth:`InterfaceState.arrays` gives; on rank 0 bodies.* of
+            What :meth:`InterfaceSolver.collect` gives; on rank 0 bodies.* of
             :meth:`WeakForm.state`; pairing.*[p] where faces slide far; dense.*, the dense system,
             which need not be that of the accepted displacement: schur, shape (n_last, n_last),
-            offset, shape (n_last,), faces, shape (n_retained, n_forces); sums, shape (4,).
+            offset, shape (n_last,), faces, shape (n_retained, n_forces); sums, shape (4,); where
+            bodies depend on their history tangent.*, the state in which the tangent was made, as
+            bodies.*, and began, shape (2,).
         """
         assert self.system.offset is not None
-        out = self.interface_state().arrays()
+        out = super().collect()
         out |= {f"bodies.{name}": values for name, values in self.bodies.state().items()}
         for p, known in enumerate(self.interfaces.pairing()):
             out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
@@ -472,6 +494,11 @@ class NewtonSolver(InterfaceSolver):
         out["dense.faces"] = self.face_loads
         sums = self.pairing.energy, self.largest_force, self.largest_energy, self.tangent.drift
         out["sums"] = np.array(sums)
+        origin = self.tangent.origin
+        if origin is not None:
+            made = self.bodies.state(origin.local)
+            out |= {f"tangent.{name}": values for name, values in made.items()}
+            out["began"] = np.array(origin.began)
         return out
 
     def resume(self, arrays: Arrays, time: float) -> None:
@@ -497,12 +524,16 @@ class NewtonSolver(InterfaceSolver):
         self.at = time
         sums = (float(x) for x in arrays["sums"])
         self.pairing.energy, self.largest_force, self.largest_energy, drift = sums
-        state = InterfaceState.from_arrays(arrays, len(self.pairs))
+        if "began" in arrays:
+            made = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("tangent.")}
+            end, dt = (float(x) for x in arrays["began"])
+            self._resumed_origin = {k: v.astype(float) for k, v in made.items()}, (end, dt)
+        super().resume(arrays, time)
+        assert self._resumed is not None
         schur, offset, faces = (
             arrays[f"dense.{name}"].astype(float) for name in ("schur", "offset", "faces")
         )
-        self._resumed_dense = _Dense(state.index, schur, offset, faces, drift)
-        self._resume(state)
+        self._resumed_dense = _Dense(self._resumed.index, schur, offset, faces, drift)
 
     # -- energies and fields -------------------------------------------------------------
 

@@ -27,12 +27,25 @@ _FEW_COLUMNS = 256
 """Up to so many last coordinates block solves beat a second factorisation on several ranks."""
 
 
+class Origin(NamedTuple):
+    """Where the tangent of bodies that depend on their history was made.
+
+    Attributes:
+        local: From :meth:`WeakForm.snapshot`.
+        began: End and length of the increment, time.
+    """
+
+    local: dict[str, Array]
+    began: tuple[float, float]
+
+
 class _Factored(NamedTuple):
     """A condensed tangent, the version of its terms, and how far it is off where it is used."""
 
     condensation: DirectCondensation
     version: tuple[int, ...]
     drift: float
+    origin: Origin | None
 
 
 class CondensedTangent:
@@ -54,6 +67,7 @@ class CondensedTangent:
         round_off: Residual that rounding alone may leave there, force.
         drift: How far the tangent at hand is off at the accepted state: what was out of balance
             where it was made, over the forces.
+        origin: Where the one at hand was made, ``None`` for bodies that have no history.
     """
 
     def __init__(
@@ -79,6 +93,7 @@ class CondensedTangent:
         self._accepted: _Factored | None = None  # where a trial has made another one
         self._spare: DirectCondensation | None = None  # whose memory the next tangent takes
         self._stiff = 0.0  # norm of K
+        self.origin: Origin | None = None
 
     def assemble(self, followed: list[Ints]) -> int:
         """Compile the forms and make the borders on first use; collective.
@@ -158,7 +173,9 @@ class CondensedTangent:
         free, self._spare = self._spare, None
         if self._condensation is not None:
             if self._accepted is None:
-                self._accepted = _Factored(self._condensation, self._version, self.drift)
+                self._accepted = _Factored(
+                    self._condensation, self._version, self.drift, self.origin
+                )
             else:
                 free = self._condensation
         self._condensation = None
@@ -180,6 +197,8 @@ class CondensedTangent:
             raise
         self._condensation = free
         self._version, self.drift = self.bodies.version, 0.0
+        if self.bodies.path_dependent:
+            self.origin = Origin(self.bodies.snapshot(), self.bodies.began)
         self._stiff = float(stiffness.norm(PETSc.NormType.NORM_INFINITY))
 
     def _drop_spare(self) -> None:
@@ -196,7 +215,7 @@ class CondensedTangent:
         """Take the tangent of the accepted state again."""
         if self._accepted is not None:
             self._spare = self._condensation
-            self._condensation, self._version, self.drift = self._accepted
+            self._condensation, self._version, self.drift, self.origin = self._accepted
             self._accepted = None
 
     # -- forces --------------------------------------------------------------------------
