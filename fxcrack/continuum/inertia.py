@@ -2,6 +2,9 @@
 
     M a_{n+1-alpha_m} + C v_{n+1-alpha_f} + f_{n+1-alpha_f} = 0        (generalised alpha)
 
+Impulses of contact change velocities alone, by w in the middle of an increment; forces of the end
+contain their mean over it, M w/dt.
+
 Chung and Hulbert (1993); Hilber, Hughes and Taylor's method and Newmark's are choices of the
 parameters. Pure data; :mod:`fxcrack.continuum.inertia` makes forms of it.
 """
@@ -127,7 +130,10 @@ class Inertia:
         return m, f, 0.25 * (1.0 - m + f) ** 2, 0.5 - m + f
 
 
-REMEMBERED = ("u", "v", "a", "b", "c")
+_SAME_LENGTH = 1e-9
+"""Increments that differ by less than this part of their length, by round-off, have one tangent."""
+
+REMEMBERED = ("u", "v", "a", "b", "c", "w")
 
 
 class InertiaForces(Term):
@@ -185,6 +191,8 @@ class InertiaForces(Term):
         if self._damped:
             self._spent["damping_energy"] = 0.0
         self._products: Any = None
+        self._mass_matrix: PETSc.Mat | None = None
+        self._w = np.zeros(size)  # velocity jump of the present increment by contact impulses
 
     def _start(self, velocity: Any) -> None:
         gdim = self._continuum.gdim
@@ -261,10 +269,11 @@ class InertiaForces(Term):
         ) / keep
         v = last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
         self._c_known.x.array[:] = v + alpha_f * (last["v"] - last["c"]) / keep
+        self._w[:] = 0.0
 
     def _take_dt(self, dt: float) -> None:
         """Set b_u and c_u for increments of a length; 0 before the first one."""
-        if dt == self._dt:
+        if abs(dt - self._dt) <= _SAME_LENGTH * dt:
             return
         alpha_m, alpha_f, beta, gamma = self._effect.parameters
         self._dt = dt
@@ -282,8 +291,9 @@ class InertiaForces(Term):
         """Acceleration and velocity at a new displacement."""
         _, _, beta, gamma = self._effect.parameters
         last, dt = self._last, self._dt
-        a = u / (beta * dt**2) + self._known_acceleration(last)
-        return a, last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
+        # an impulse acts half way through the increment
+        a = u / (beta * dt**2) + self._known_acceleration(last) - self._w / (2.0 * beta * dt)
+        return a, last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a) + self._w
 
     def update(self, u: fem.Function) -> None:
         """Set the trial velocity."""
@@ -296,16 +306,19 @@ class InertiaForces(Term):
             return
         self._moving = False
         a, v = self._motion(u.x.array)
+        w = self._w / self._dt
         new = {
             "u": u.x.array.copy(),
             "v": v,
             "a": a,
-            "b": float(self._b_u.value) * u.x.array + self._b_known.x.array,
+            "b": float(self._b_u.value) * u.x.array + self._b_known.x.array - w,
             "c": float(self._c_u.value) * u.x.array + self._c_known.x.array,
+            "w": w,
         }
         last = self._last
         step = new["u"] - last["u"]
-        given = self._product("mass", 0.5 * (last["b"] + new["b"]), step)
+        mean = 0.5 * (last["b"] + last["w"] + new["b"] + new["w"])
+        given = self._product("mass", mean, step)
         gained = 0.5 * self._product("mass", v + last["v"], v - last["v"])
         self._spent["numerical_dissipation"] += given - gained
         if self._damped:
@@ -313,6 +326,65 @@ class InertiaForces(Term):
             self._spent["damping_energy"] += self._product("damping", mean, step)
         self._last = new
         self.velocity.x.array[:] = v
+
+    def begin_at(self, u: fem.Function) -> None:
+        """Begin the motion at a displacement that loads at rest have brought about."""
+        if not self._dt > 0.0:
+            self._last["u"] = u.x.array.copy()
+
+    # -- contact impulses ----------------------------------------------------------------
+
+    @property
+    def impulse_factor(self) -> float:
+        """Impulse of a contact force that is found at the end of an increment, time.
+
+        Displacements feel half of the velocity jump w over the increment, so that the force at its
+        end is b_u dt/2 M w.
+        """
+        return 2.0 / (float(self._b_u.value) * self._dt)
+
+    def mass_matrix(self) -> PETSc.Mat:
+        """M on the displacements, owned by this object; collective."""
+        if self._mass_matrix is None:
+            space = self._continuum.space
+            v, a = ufl.TestFunction(space), ufl.TrialFunction(space)
+            self._mass_matrix = dolfinx.fem.petsc.assemble_matrix(fem.form(self._mass(a, v)))
+            self._mass_matrix.assemble()
+        return self._mass_matrix
+
+    def last_impulse(self) -> PETSc.Vec | None:
+        """Velocity jump of the last committed increment over its length, owned dofs; collective.
+
+        The caller destroys it; ``None`` if there was none.
+        """
+        w = self._last["w"]
+        if not self._continuum.comm.allreduce(bool(w.any()), op=MPI.LOR):
+            return None
+        out = self.velocity.x.petsc_vec.duplicate()
+        out.array[:] = w[: self._continuum.n_local]
+        return out
+
+    def jump_velocity(self, w: PETSc.Vec) -> tuple[float, float]:
+        """Give the bodies the velocity jump of the contact impulses of this increment; collective.
+
+        Args:
+            w: Owned dofs, length/time.
+
+        Returns:
+            Length of the increment, and the change of the inertia forces of its end over M w,
+            1/time: they contain the mean force of the impulse from now on.
+        """
+        jump = fem.Function(self._continuum.space)
+        jump.x.array[: self._continuum.n_local] = w.array_r
+        jump.x.scatter_forward()
+        self._w[:] = jump.x.array
+        change = 1.0 / self._dt - 0.5 * float(self._b_u.value) * self._dt
+        self._b_known.x.array[:] += change * self._w
+        return self._dt, change
+
+    def add_loss(self, energy: float) -> None:
+        """Add to the energy dissipated by the method."""
+        self._spent["numerical_dissipation"] += energy
 
     def _product(self, name: str, x: Array, y: Array) -> float:
         """Mass or damping matrix between two vectors; collective."""
@@ -339,8 +411,9 @@ class InertiaForces(Term):
         """Motion of the last commit, dissipated energies and increment length.
 
         Returns:
-            "u" (length), "v" and "c" (length/time), "a" and "b" (length/time^2): local dofs, ghosts
-            too, each of shape (n_dofs,); "sums": the values of :meth:`spent`, force x length, shape
+            "u" (length), "v" and "c" (length/time), "a", "b" and "w" (length/time^2; the velocity
+            jump of contact impulses over the increment): local dofs, ghosts too, each of shape
+            (n_dofs,); "sums": the values of :meth:`spent`, force x length, shape
             (1,), with Rayleigh damping (2,); "dt": length of the last increment, time, shape (1,).
         """
         out = {name: value.copy() for name, value in self._last.items()}
@@ -356,7 +429,10 @@ class InertiaForces(Term):
         Args:
             state: From :meth:`state`, arrays of the same shapes.
         """
-        self._last = {name: state[name].copy() for name in REMEMBERED}
+        # states that were saved before there were contact impulses have no "w"
+        none = np.zeros_like(state["u"])
+        self._last = {name: state.get(name, none).copy() for name in REMEMBERED}
+        self._w[:] = 0.0
         self._spent = dict(zip(self._spent, (float(x) for x in state["sums"]), strict=True))
         self._moving = False
         self._take_dt(float(state["dt"][0]))
@@ -365,6 +441,7 @@ class InertiaForces(Term):
             (self._c_known, "c", self._c_u),
         ):
             known.x.array[:] = self._last[name] - float(factor.value) * self._last["u"]
+        self._b_known.x.array[:] += self._last["w"]
         self.velocity.x.array[:] = self._last["v"]
 
 

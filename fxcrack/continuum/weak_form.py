@@ -22,6 +22,7 @@ from fxcrack.base import compat
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.inertia import InertiaForces
 from fxcrack.continuum.input_order import FileOrder, Place
 from fxcrack.continuum.stress import cell_means
 from fxcrack.continuum.term import Term
@@ -76,6 +77,11 @@ class WeakForm:
     def dynamic(self) -> bool:
         """Whether forces depend on how long an increment takes."""
         return any(t.dynamic for t in self.terms)
+
+    @property
+    def inertia(self) -> InertiaForces | None:
+        """Inertia of the bodies, if they have any."""
+        return next((t for t in self.terms if isinstance(t, InertiaForces)), None)
 
     @property
     def closed(self) -> bool:

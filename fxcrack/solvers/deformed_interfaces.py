@@ -158,7 +158,7 @@ class PairingEnergy:
         """
         forces.axpy(1.0, self._before)
         given = 0.5 * float(forces.dot(step)) - work.support_work(n_forces)
-        self.energy -= given + work.bonds + work.friction
+        self.energy -= given + work.bonds + work.friction + work.contact
         forces.destroy()
         self.forget()
 

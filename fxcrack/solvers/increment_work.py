@@ -18,6 +18,7 @@ from petsc4py import PETSc
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import ConvergenceError
 from fxcrack.equilibrium.contact import Equilibrium, bond_work
+from fxcrack.equilibrium.moving_contact import ImpulseWork
 
 FINE = 1.0 / 512.0
 """Part of an increment, or of a bond force, that is not divided whatever the energies are."""
@@ -38,6 +39,8 @@ class IncrementWork:
         jump: Integral of the jumps over s, shape (n_retained,), length.
         bonds: Energy released by bonds whose force falls.
         friction: Energy dissipated by friction.
+        contact: Energy taken by contact impulses of bodies in motion beyond that, by the
+            trapezoidal rule.
     """
 
     start: Equilibrium
@@ -46,6 +49,7 @@ class IncrementWork:
     jump: Array
     bonds: float
     friction: float
+    contact: float = 0.0
 
     def support_work(self, n_forces: int) -> float:
         """Work of supports, where there are ``n_forces`` force patterns."""
@@ -77,6 +81,7 @@ class TrialIncrement:
         values: Forces of the last coordinates and values of the borders there, shape (n_last,).
         drift: What was out of balance where the tangent at hand was made, over the forces.
         noise: What the energies along the path are known to.
+        impulses: Work of contact impulses, of bodies in motion that touch.
         energies: Energies stored at the end, by name, ``None`` before they are asked for.
         work: Work along the path, ``None`` before it is confirmed.
     """
@@ -92,6 +97,7 @@ class TrialIncrement:
     values: Array
     drift: float
     noise: float
+    impulses: ImpulseWork | None = None
     energies: dict[str, float] | None = None
     work: IncrementWork | None = None
 
@@ -119,13 +125,21 @@ class TrialIncrement:
         )
         states = [*(point for _, point in points), end]
         bonds = sum(bond_work(a, b) for a, b in pairwise(states))
+        contact = 0.0
+        conjugate += _along(points, "conjugate")
+        if self.impulses is not None:
+            more = self.impulses.supports
+            conjugate[: len(more)] += more
+            bonds += self.impulses.bonds
+            contact = self.impulses.beyond
         return IncrementWork(
             here,
             end,
-            _along(points, "conjugate") + conjugate,
+            conjugate,
             _along(points, "jump") + jump,
             bonds + float(given @ jump),
             self.friction,
+            contact,
         )
 
 

@@ -270,6 +270,7 @@ class NewtonSolver(InterfaceSolver):
             trial = self._increments.find(
                 self.system, self.state, self.u, loads, force, at,
                 follow=follow and not dynamic, largest_force=self.largest_force,
+                moving=dynamic and self._begun,
             )  # fmt: skip
         except ConvergenceError:
             self._fail()
@@ -336,8 +337,15 @@ class NewtonSolver(InterfaceSolver):
         if self.pairing.pending:
             self.pairing.book(self.nodal_forces(self.u), step, trial.work, len(self.loads))
         step.destroy()
+        inertia = self.bodies.inertia
         if self._begun:
             self.bodies.commit()
+        elif inertia is not None:
+            self.bodies.set(self.u)
+            inertia.begin_at(self.bodies.u)
+        if trial.work.contact:
+            assert inertia is not None
+            inertia.add_loss(trial.work.contact)
 
     def revert(self) -> None:
         """Reject the last trial; collective."""
@@ -593,6 +601,7 @@ class NewtonSolver(InterfaceSolver):
         """Free all PETSc objects; collective."""
         self._give_up()
         self.pairing.forget()
+        self._increments.destroy()
         self.tangent.destroy()
 
 

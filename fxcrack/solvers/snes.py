@@ -22,6 +22,7 @@ from fxcrack.base.errors import ConvergenceError, SolverError
 from fxcrack.condensation.mumps_schur import mumps_message
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.equilibrium.moving_contact import MovingContact
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
 
@@ -39,6 +40,9 @@ _DIVERGED = 10.0
 """Whole steps have diverged where the residual is this many times the one at their start or
 after the first of them: the first may be the only one that knows of a new pressure or temperature.
 """
+_SETTLING = 2
+"""In so many iterations it is found anew which faces of bodies in motion would overlap; later ones
+only add to them, so that none changes for ever."""
 
 REASONS = {
     -1: "the function left its domain",
@@ -89,6 +93,7 @@ class InterfaceSnes:
         options: Controls of the iteration.
         counts: Where solves and residuals are counted.
         largest_force: Largest norm of the internal forces of an accepted state, force.
+        motion: Contact over the increment of time, where bodies that touch are in motion.
     """
 
     def __init__(
@@ -104,8 +109,11 @@ class InterfaceSnes:
         options: NewtonOptions,
         counts: Counts,
         largest_force: float,
+        motion: MovingContact | None = None,
     ) -> None:
         self.tangent, self.system = tangent, system
+        self.motion = motion
+        self._steps = 0
         self.accepted, self.u = accepted, u
         self.options, self.counts = options, counts
         self.loads, self.force = loads, force
@@ -222,6 +230,9 @@ class InterfaceSnes:
         else:
             self._reused += 1
         self._steps_since += 1
+        self._steps += 1
+        if self.motion is not None and self._steps <= _SETTLING:
+            self.motion.begin_again()
         start = time.perf_counter()
         self.solution = self._interface_equilibrium()
         tangent.timings.add("interface", start)
@@ -260,7 +271,8 @@ class InterfaceSnes:
     def _interface_equilibrium(self) -> Equilibrium:
         """Jumps and forces on the present tangent, softening bonds on their right branches."""
         system = self.system
-        state = system.equilibrium(self.loads, self.force)
+        equilibrium = system.equilibrium if self.motion is None else self.motion.equilibrium
+        state = equilibrium(self.loads, self.force)
         for _ in range(4 * len(system.soft.bonds) + 4 if system.soft.bonds else 0):
             if not system.soft.stable():
                 state = system.pass_unstable(state)
@@ -269,7 +281,7 @@ class InterfaceSnes:
             if not np.isfinite(at):
                 break
             system.finish([b for b in leaving if system.soft.switch(b, state.jump)])
-            state = system.equilibrium(self.loads, self.force)
+            state = equilibrium(self.loads, self.force)
         return state
 
     def converged(self, snes: Any, its: int, norms: tuple[float, float, float]) -> int:
@@ -286,7 +298,7 @@ class InterfaceSnes:
         self.level = level
         if its == 0:
             self.drift = norm / self.scale if norm > level else 0.0
-        if norm <= level and self.fraction == 1.0:
+        if norm <= level and self.fraction == 1.0 and (its > 0 or self.motion is None):
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
         if its - self._reused >= self.options.max_iterations:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)

@@ -11,7 +11,9 @@ from fxcrack.base.arrays import Array
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.friction_state import FrictionWork
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.equilibrium.moving_contact import MovingContact, closed_components, known_forces
 from fxcrack.solvers import snes
+from fxcrack.solvers.impulses import ContactImpulses
 from fxcrack.solvers.increment_work import TrialIncrement
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
@@ -42,6 +44,20 @@ class IncrementSolver:
         self._tangent, self._options = tangent, options
         self._n_loads, self._n_forces = n_loads, n_forces
         self.counts = snes.Counts()
+        self._motion_of = tangent.bodies.inertia
+        self._known_impulses: ContactImpulses | None = None
+
+    @property
+    def _impulses(self) -> ContactImpulses:
+        if self._known_impulses is None:
+            assert self._motion_of is not None
+            self._known_impulses = ContactImpulses(self._motion_of)
+        return self._known_impulses
+
+    def destroy(self) -> None:
+        """Free all PETSc objects; collective."""
+        if self._known_impulses is not None:
+            self._known_impulses.destroy()
 
     def find(
         self,
@@ -54,6 +70,7 @@ class IncrementSolver:
         *,
         follow: bool,
         largest_force: float,
+        moving: bool = False,
     ) -> TrialIncrement:
         """Find the equilibrium at other loads and given forces; collective.
 
@@ -69,6 +86,7 @@ class IncrementSolver:
             at: Time of the end.
             follow: Follow contact and softening on the path; else go straight to the end.
             largest_force: Largest norm of the internal forces of an accepted state, force.
+            moving: Whether it is an increment of time of bodies with inertia.
 
         Raises:
             ConvergenceError: None was found.
@@ -76,13 +94,26 @@ class IncrementSolver:
         tangent, n = self._tangent, system.n_retained
         start = time.perf_counter()
         points = [(0.0, here)]
-        if follow:
+        motion = None
+        if moving and (system.contact.any() or system.friction is not None):
+            motion = MovingContact(system, here)
+        if motion is not None:
+            # the tangent at hand does not know of the motion: it predicts nothing
+            points.append((1.0, Equilibrium(loads, force, here.jump, here.conjugate)))
+        elif follow:
             points += system.pieces(here, loads, force)
         else:
             points.append((1.0, system.equilibrium(loads, force)))
         predicted = points[-1][1]
-        rate = system.rates(loads - here.loads, force - here.force)
-        sliding = None if system.friction is None else FrictionWork.of(system, points)
+        if motion is None:
+            rate = system.rates(loads - here.loads, force - here.force)
+            guess = system.forces(predicted, np.arange(n))
+        else:
+            rate = np.zeros(n), np.zeros(self._n_loads)
+            guess = known_forces(system, here, force)
+        sliding = None
+        if system.friction is not None and motion is None:
+            sliding = FrictionWork.of(system, points)
         tangent.timings.add("interface", start)
         soft = system.soft.components
         last = np.zeros(tangent.coordinates.n_last)
@@ -90,16 +121,23 @@ class IncrementSolver:
         last[n : n + self._n_loads] = predicted.loads - here.loads
         y = tangent.condensation.expanded(last)
         problem = snes.InterfaceSnes(
-            tangent, system, here, u, loads, force, system.forces(predicted, np.arange(n)),
-            options=self._options, counts=self.counts, largest_force=largest_force,
+            tangent, system, here, u, loads, force, guess, options=self._options,
+            counts=self.counts, largest_force=largest_force, motion=motion,
         )  # fmt: skip
         self.counts.residuals = []
+        means = np.zeros((2, tangent.coordinates.n_last))
+        if motion is not None:
+            means[0] = self._impulses.last(tangent.coordinates)
         try:
             iterations = snes.solve(problem, y)
+            if motion is not None:
+                means[1] = self._impulses_of(system, problem)
             end, values = self._end(system, problem, predicted, loads)
             to = tangent.coordinates.transform.createVecLeft()
             tangent.coordinates.transform.mult(y, to)
         finally:
+            if motion is not None:
+                motion.end()
             problem.destroy()
             y.destroy()
         # forces are known to what the iteration leaves out of balance, and so is their work
@@ -108,10 +146,32 @@ class IncrementSolver:
         self.counts.solves += 1
         self.counts.iterations += iterations
         drift = problem.drift + (0.0 if problem.renewed else tangent.drift)
-        friction = 0.0 if sliding is None else sliding.energy(system, end)
+        friction, impulses = 0.0, None
+        if sliding is not None:
+            friction = sliding.energy(system, end)
+        elif motion is not None:
+            n_supports = self._n_loads - self._n_forces
+            impulses = motion.work(end, means, n_supports)
+            friction = impulses.friction
         return TrialIncrement(
-            points, end, rate, soft, iterations, friction, at, to, values, drift, noise
+            points, end, rate, soft, iterations, friction, at, to, values, drift, noise, impulses
         )
+
+    def _impulses_of(self, system: ContactSystem, problem: snes.InterfaceSnes) -> Array:
+        """Give the bodies the contact impulses of an increment of time.
+
+        Returns:
+            Their mean forces on the last coordinates, shape (n_last,); the problem's values contain
+            them.
+        """
+        rows, n = closed_components(system), system.n_retained
+        if problem.solution is None or not len(rows):
+            return np.zeros(len(problem.values))
+        force = np.zeros(n)
+        force[rows] = problem.values[rows] - problem.solution.force[rows]
+        means, change = self._impulses.apply(self._tangent.coordinates, force, system.knows_force())
+        problem.values = problem.values + change * means
+        return means
 
     def _end(
         self,

@@ -16,6 +16,8 @@ from fxcrack.steps.increment_control import IncrementControl
 from fxcrack.steps.release import release_critical
 from fxcrack.steps.static import Static
 
+_SAME_TIME = 1e-9
+"""Times closer together than this part of an increment are the same."""
 _AT_TOP, _NEAR_TOP = 1e-6, 1e-2
 """How far f may differ from the upper end of its release range by what one node has of the next,
 and the fraction of the range in which it is so near that end that cutting back gains nothing."""
@@ -58,7 +60,9 @@ def step_by_increments(driver: StepDriver) -> str:
         met = _met_at_start(analysis)
         smallest = neutral or any(met)
         size = step.minimum if smallest else control.size
-        target = min([analysis.time + size, driver.end_time, *driver.breaks_ahead()])
+        target, limit = analysis.time + size, min([driver.end_time, *driver.breaks_ahead()])
+        if target > limit - _SAME_TIME * size:
+            target = limit  # no increment of round-off is left before it
         saved = analysis.snapshot()
         analysis.balance.increment += 1
         try:
