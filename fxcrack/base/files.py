@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import json
 import os
-import tempfile
+import secrets
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import BinaryIO
+
+_NO_LINK = getattr(os, "O_NOFOLLOW", 0)
+
+
+def open_to_append(path: Path) -> BinaryIO:
+    """Open a file that is there to add to its end; a symbolic link is not followed."""
+    return os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND | _NO_LINK), "ab", buffering=0)
 
 
 @contextmanager
@@ -15,12 +23,12 @@ def replacing(path: str | Path) -> Iterator[Path]:
     """Yield a temporary path in the same folder; it replaces ``path`` if nothing fails."""
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem}.", suffix=path.suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
+    # a name nobody can guess, which must not be there yet, with the permissions that the umask of
+    # the user leaves
+    temporary = path.parent / f".{path.stem}.{secrets.token_hex(8)}{path.suffix}"
+    os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_LINK, 0o666))
     try:
         yield temporary
-        temporary.chmod(0o644)
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)

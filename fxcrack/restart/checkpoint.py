@@ -7,8 +7,11 @@ written beside its place and renamed, so that it is whole whenever a job ends.
 
 from __future__ import annotations
 
+import io
 import json
+import math
 import os
+import stat
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -28,7 +31,7 @@ from fxcrack.base.parallel import all_or_none
 
 Arrays = dict[str, npt.NDArray[np.generic]]
 
-VERSION = 4
+VERSION = 5
 """Changes when a file of an earlier program can no longer be read."""
 
 
@@ -102,26 +105,108 @@ def read(comm: MPI.Comm, path: Path) -> Saved | None:
         InputError: The file is no checkpoint, or of another version.
     """
     found: Saved | str | None = None
-    if comm.rank == 0 and path.exists():
+    if comm.rank == 0 and os.path.lexists(path):
         try:
-            with np.load(path, allow_pickle=False) as content:
-                arrays = dict(content)
-            about = json.loads(arrays.pop("about").tobytes())
-            found = Saved(about, arrays)
-            if about["version"] != VERSION:
-                found = (
-                    f"checkpoint {path} has version {about['version']} of the format, this "
-                    f"program reads version {VERSION}; run without restart"
-                )
-        except (OSError, EOFError, KeyError, ValueError, zipfile.BadZipFile) as error:
+            found = _read(path)
+        except Exception as error:  # whatever a foreign content makes the readers raise
             found = (
-                f"{path} is no checkpoint of fxcrack ({error}); give another file, or run without "
-                "restart"
+                f"{path} is no checkpoint of fxcrack ({error or type(error).__name__}); give "
+                "another file, or run without restart"
             )
     found = comm.bcast(found)
     if isinstance(found, str):
         raise InputError(found)
     return found
+
+
+def _read(path: Path) -> Saved | str:
+    """Read a checkpoint on one rank; returns what is wrong where it is one that cannot be used.
+
+    Nothing is unpacked before its size is known to be that of the file, and nothing in the file is
+    believed.
+
+    Raises:
+        Exception: It is none.
+    """
+    # a pipe would block until somebody writes into it
+    handle = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    with os.fdopen(handle, "rb") as stream:
+        status = os.fstat(handle)
+        if not stat.S_ISREG(status.st_mode):
+            raise ValueError("it is no regular file")
+        with zipfile.ZipFile(stream) as content:
+            parts = content.infolist()
+            if any(part.compress_type != zipfile.ZIP_STORED for part in parts):
+                raise ValueError("it is compressed, which checkpoints are not")
+            if sum(part.file_size for part in parts) > status.st_size:
+                raise ValueError("its parts are larger than the file")
+            names = [part.filename for part in parts]
+            if len(set(names)) < len(names) or not all(n.endswith(".npy") for n in names):
+                raise ValueError("its parts are no arrays of different names")
+            arrays: Arrays = {n.removesuffix(".npy"): _array(content, n) for n in names}
+    about = json.loads(arrays.pop("about").tobytes())
+    if not isinstance(about, dict) or "version" not in about:
+        raise ValueError("it says nothing of its version")
+    if about["version"] != VERSION:
+        return (
+            f"checkpoint {path} has version {about['version']} of the format, this program reads "
+            f"version {VERSION}; run without restart"
+        )
+    for name, kind in _ABOUT.items():
+        if not isinstance(about.get(name), kind):
+            raise ValueError(f"its entry '{name}' is missing or no {kind.__name__}")
+    bad = _not_finite(about, arrays)
+    if bad:
+        raise ValueError(f"its state holds NaN or infinity in '{bad}'")
+    return Saved(about, arrays)
+
+
+_ABOUT: dict[str, type] = {
+    **{"run": str, "finished": str, "scene": dict, "progress": dict},
+    **{"balance": dict, "ramps": list, "fatigue": dict, "rows": dict},
+}
+"""What ``about`` must hold, and as what."""
+
+_STATE = ("jump[", "force[", "loads", "conjugate", "bodies.", "dense.", "fatigue.credit")
+"""Beginnings of the names of arrays that are finite in any equilibrium; in others NaN and infinity
+stand for what does not exist (yet): rates of a criterion without, the largest opening of a new
+softening bond."""
+
+
+def _array(content: zipfile.ZipFile, name: str) -> npt.NDArray[np.generic]:
+    """One array of a file, whose header must tell the size that it has.
+
+    Raises:
+        ValueError: It does not, or the array holds other than numbers and texts.
+    """
+    raw = content.read(name)
+    stream = io.BytesIO(raw)
+    version = np.lib.format.read_magic(stream)
+    if version == (1, 0):
+        shape, fortran, dtype = np.lib.format.read_array_header_1_0(stream)
+    elif version == (2, 0):
+        shape, fortran, dtype = np.lib.format.read_array_header_2_0(stream)
+    else:
+        raise ValueError(f"its array '{name}' has version {version} of the format")
+    if dtype.hasobject or dtype.kind not in "biufUS":
+        raise ValueError(f"its array '{name}' holds values of type {dtype}")
+    count = math.prod(shape)
+    if min(shape, default=1) < 0 or count * dtype.itemsize != len(raw) - stream.tell():
+        raise ValueError(f"its array '{name}' has not the size it claims, {shape}")
+    flat = np.frombuffer(raw, dtype, count, stream.tell()) if count else np.zeros(0, dtype)
+    return flat.reshape(shape, order="F" if fortran else "C").copy()
+
+
+def _not_finite(about: dict[str, Any], arrays: Arrays) -> str:
+    """Name of a part of the state that holds NaN or infinity, empty if none does."""
+    for name, values in arrays.items():
+        if values.dtype.kind == "f" and name.startswith(_STATE):
+            if not np.all(np.isfinite(values.astype(np.float64))):
+                return name
+    for name, value in about["balance"].items():
+        if isinstance(value, float) and not math.isfinite(value):
+            return f"balance.{name}"
+    return ""
 
 
 # -- checkpoints of scenes that do not ask for them -------------------------------------------

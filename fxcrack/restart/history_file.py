@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from fxcrack.base.errors import InputError
+from fxcrack.base.files import open_to_append
 from fxcrack.history import History
 
 _SECONDS = 1.0
@@ -84,7 +85,7 @@ class HistoryFile:
         text = io.StringIO(newline="")
         csv.DictWriter(text, self._columns).writerows(rows)
         content = text.getvalue().encode()
-        with self.path.open("ab", buffering=0) as stream:
+        with open_to_append(self.path) as stream:
             try:
                 written = 0
                 while written < len(content):

@@ -9,7 +9,8 @@ from __future__ import annotations
 import importlib.metadata
 import time
 import uuid
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -24,8 +25,36 @@ from fxcrack.base.signals import Interrupted, Listener
 from fxcrack.restart.checkpoint import Checkpoint, Saved, next_of_folder, read, write
 from fxcrack.restart.fingerprint import differences, fingerprint, summary
 from fxcrack.restart.history_file import HistoryFile
-from fxcrack.restart.scene_state import apply_after_condensation, apply_before_condensation, collect
+from fxcrack.restart.scene_state import (
+    Packed,
+    apply_after_condensation,
+    apply_before_condensation,
+    collect,
+)
 from fxcrack.steps.analysis import Analysis
+
+_MALFORMED = (
+    *(ArithmeticError, AssertionError, AttributeError, LookupError),
+    *(MemoryError, StopIteration, TypeError, ValueError),
+)
+"""What plain values raise that are not those which this program writes."""
+
+
+@contextmanager
+def _refused(path: Path) -> Iterator[None]:
+    """Say that a checkpoint is none, where what it holds cannot be put into the analysis.
+
+    What it holds is the same on every rank, and so is the error.
+    """
+    try:
+        yield
+    except FxcrackError:
+        raise
+    except _MALFORMED as error:
+        raise InputError(
+            f"{path} is no checkpoint of fxcrack that fits this scene ({type(error).__name__}: "
+            f"{error}); give another file, or run without restart"
+        ) from error
 
 
 class RestartManager:
@@ -73,6 +102,7 @@ class RestartManager:
         self._count, self._last = 0, time.monotonic()
         self._print: dict[str, Any] = {}
         self._saved: Saved | None = None
+        self._packed = Packed()
         self.progress: dict[str, Any] | None = None
         self.finished = ""
         if checkpoint is not None:
@@ -103,8 +133,9 @@ class RestartManager:
                 f"checkpoint {path} belongs to another scene: {summary(found)}. Run without "
                 "restart, or mend the scene"
             )
+        with _refused(path):
+            apply_before_condensation(self._analysis, saved)
         files.run_id = saved.about["run"]
-        apply_before_condensation(self._analysis, saved)
         self._saved = saved
         self.progress = saved.about["progress"]
         self.finished = saved.about["finished"]
@@ -118,7 +149,9 @@ class RestartManager:
     def put_in_equilibrium(self) -> None:
         """Find the saved equilibrium on the retained jumps."""
         assert self._saved is not None
-        apply_after_condensation(self._analysis, self._saved)
+        assert self._checkpoint is not None
+        with _refused(self._checkpoint.file(self._files.steps)):
+            apply_after_condensation(self._analysis, self._saved)
         self._saved = None
 
     def __enter__(self) -> RestartManager:
@@ -176,7 +209,7 @@ class RestartManager:
 
     def _save(self, progress: dict[str, Any], reason: str) -> None:
         assert self._checkpoint is not None
-        saved = collect(self._analysis)
+        saved = collect(self._analysis, self._packed)
         about = {
             "fxcrack": importlib.metadata.version("fxcrack"),
             "run": self._files.run_id,

@@ -7,6 +7,7 @@ every rank.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any, get_args
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from fxcrack.base.errors import InputError
 from fxcrack.restart.checkpoint import Arrays, Saved
+from fxcrack.restart.growing import Cell, GrowingArray, RowTable, rows_of
 from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis, EnergyBalance
 from fxcrack.steps.bond_records import ReleaseRecord
@@ -24,12 +26,32 @@ _SAME = 1e-9
 """Loads are numbers of the input: they differ by round-off or by far more."""
 
 
-def collect(analysis: Analysis) -> Saved:
-    """State of an analysis; collective."""
+class Packed:
+    """What grows with the analysis, packed for checkpoints once.
+
+    The history, the table of cycles, and per crack and field of its records the releases so far.
+    """
+
+    def __init__(self) -> None:
+        self.rows = RowTable()
+        self.cycles = RowTable()
+        self.records: dict[tuple[int, str], GrowingArray] = {}
+
+
+def collect(analysis: Analysis, packed: Packed) -> Saved:
+    """State of an analysis; collective.
+
+    Args:
+        analysis: The analysis.
+        packed: What earlier calls have packed of it, updated.
+    """
     fatigue = analysis.fatigue
     arrays = analysis.solver.collect()
     for g in analysis.cracks:
-        arrays |= _collect_records(g)
+        arrays |= _collect_records(g, packed)
+    packed.rows.update(analysis.history.rows)
+    packed.cycles.update(_Cycles(fatigue.table))
+    arrays |= packed.rows.arrays("rows") | packed.cycles.arrays("cycles")
     for i, ramp in enumerate(analysis.ramps):
         arrays |= _ramp_arrays(i, ramp)
     for p in fatigue.waiting:
@@ -38,8 +60,13 @@ def collect(analysis: Analysis) -> Saved:
     about = {
         "balance": analysis.balance.asdict(),
         "ramps": [_ramp(r) for r in analysis.ramps],
-        "fatigue": {"N": fatigue.N, "pairs": list(fatigue.waiting), "table": fatigue.table},
-        "rows": analysis.history.rows,
+        "fatigue": {
+            "N": fatigue.N,
+            "pairs": list(fatigue.waiting),
+            "columns": list(fatigue.table),
+            "table": packed.cycles.names(),
+        },
+        "rows": packed.rows.names(),
     }
     return Saved(about, arrays)
 
@@ -48,14 +75,18 @@ def apply_before_condensation(analysis: Analysis, saved: Saved) -> None:
     """Put a new analysis into a saved state, up to what needs its retained jumps."""
     about, arrays = saved.about, saved.arrays
     analysis.balance = EnergyBalance(**about["balance"])
-    analysis.history.rows[:] = about["rows"]
+    rows = rows_of(about["rows"], arrays, "rows")
+    if not all(isinstance(row.get("event"), str) and "time" in row for row in rows):
+        raise ValueError("a row of the history has no event or no time")
+    analysis.history.rows[:] = rows
     analysis.ramps = [_ramp_of(analysis, i, r, arrays) for i, r in enumerate(about["ramps"])]
     analysis.solver.resume(arrays, analysis.time)
     for g in analysis.cracks:
         _apply_records(g, arrays)
     fatigue, known = analysis.fatigue, about["fatigue"]
     fatigue.N = known["N"]
-    fatigue.table = known["table"]
+    cycles = rows_of(known["table"], arrays, "cycles")
+    fatigue.table = {name: [row[name] for row in cycles] for name in known["columns"]}
     for p in known["pairs"]:
         fatigue.waiting[p] = np.asarray(arrays[f"fatigue.waiting[{p}]"], dtype=bool)
         fatigue.credit[p] = np.asarray(arrays[f"fatigue.credit[{p}]"], dtype=float)
@@ -77,12 +108,32 @@ def apply_after_condensation(analysis: Analysis, saved: Saved) -> None:
     _check_jumps(analysis.solver, saved.arrays)
 
 
-def _collect_records(growth: Crack) -> Arrays:
+class _Cycles(Sequence[dict[str, Cell]]):
+    """The table of cycles, which has columns, as rows."""
+
+    def __init__(self, table: dict[str, list[Cell]]) -> None:
+        self._table = table
+
+    def __len__(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self._table.values()), []))
+
+    def __getitem__(self, which: Any) -> Any:
+        """A row, or a list of them for a slice."""
+        if isinstance(which, slice):
+            return [self[i] for i in range(*which.indices(len(self)))]
+        return {name: column[which] for name, column in self._table.items()}
+
+
+def _collect_records(growth: Crack, packed: Packed) -> Arrays:
     """One array per field of the records, first axis the releases."""
-    return {
-        f"record.{f.name}[{growth.p}]": np.array([getattr(r, f.name) for r in growth.records])
-        for f in fields(ReleaseRecord)
-    }
+    out: Arrays = {}
+    for f in fields(ReleaseRecord):
+        known = packed.records.setdefault((growth.p, f.name), GrowingArray())
+        for record in growth.records[len(known) :]:
+            known.append(getattr(record, f.name))
+        out[f"record.{f.name}[{growth.p}]"] = known.array()
+    return out
 
 
 def _apply_records(growth: Crack, arrays: Arrays) -> None:
