@@ -44,6 +44,8 @@ from fxcrack.criteria import (
     Tabulated,
     TipEvaluator,
 )
+from fxcrack.deck.deck import Deck, read_deck
+from fxcrack.deck.write import write_deck
 from fxcrack.effects import FiniteStrain
 from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
@@ -115,6 +117,7 @@ __all__ = [
     "CriticalStress",
     "Cycles",
     "Debond",
+    "Deck",
     "Displacement",
     "Dynamic",
     "EnhancedVCCT",
@@ -161,8 +164,10 @@ __all__ = [
     "checkpoints",
     "displacement_function",
     "mesh_from_gmsh",
+    "read_deck",
     "read_mesh",
     "tip_table",
+    "write_deck",
     "write_fields",
     "write_releases",
     "write_tip_table",

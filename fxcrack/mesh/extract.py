@@ -15,7 +15,7 @@ from dolfinx.mesh import CellType
 from fxcrack.base.arrays import Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import MeshError
-from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct
+from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct, vertices_of
 
 _CELLS = {
     2: ("triangle", 1),
@@ -169,8 +169,7 @@ def _check_nodes(raw: RawMesh) -> None:
     """Refuse a node group with a midside node: DOLFINx has only vertices as points."""
     if raw.order == 1:
         return
-    is_vertex = np.zeros(len(raw.points), dtype=bool)
-    is_vertex[raw.cells[:, : raw.n_vertices(raw.tdim)]] = True
+    is_vertex = vertices_of(raw)
     for name, group in raw.groups.items():
         midside = group.rows[~is_vertex[group.rows[:, 0]], 0] if group.dim == 0 else []
         if len(midside):
