@@ -49,7 +49,7 @@ from fxcrack.deck.write import write_deck
 from fxcrack.effects import FiniteStrain
 from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
-from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
+from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.tables import (
     BondHistory,
@@ -58,6 +58,7 @@ from fxcrack.output.tables import (
     write_releases,
     write_tip_table,
 )
+from fxcrack.output.usual_names import with_usual_names
 from fxcrack.restart.checkpoint import Checkpoint, checkpoints
 from fxcrack.scene import Debond, Scene
 from fxcrack.solvers.options import NewtonOptions
@@ -163,10 +164,12 @@ __all__ = [
     "bond_table",
     "checkpoints",
     "displacement_function",
+    "from_dolfinx",
     "mesh_from_gmsh",
     "read_deck",
     "read_mesh",
     "tip_table",
+    "with_usual_names",
     "write_deck",
     "write_fields",
     "write_releases",

@@ -398,7 +398,7 @@ def test_dynamic_steps(tmp_path):
     assert (effect.alpha_f, effect.rayleigh) == (0.1, (0.5, 0.0))
     assert found.steps[0].step.dt == 0.1
     (force,) = found.arguments["loads"]  # loads jump in dynamic steps
-    assert force.amplitude == fx.Amplitude((0.0, 1.0), (1.0, 1.0))
+    assert force.amplitude(0.0) == 0.0 and force.amplitude(2e-6) == force.amplitude(1.0) == 1.0
     explicit = text.replace(", ALPHA=-0.1, DIRECT", ", EXPLICIT")
     refused(tmp_path, explicit + "*END STEP\n", "explicit dynamics is not available yet")
 
@@ -554,3 +554,45 @@ def test_two_bars_of_plane_stress_run(tmp_path):
     row = deck.run().rows[-1]
     # the fibres of the first bar stand upright: E = E_2
     assert row["v[Bar-1.End]"] > 0.0 and row["balance"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_free_thermal_expansion(tmp_path):
+    text = PLATE.replace("200., 0.25", "200., 0.25\n*EXPANSION\n1E-3")
+    text += "*BOUNDARY\nLEFT, 1\n1, 2\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 20.\n"
+    cards = ("*TEMPERATURE", "ALL, 70.", "*NODE PRINT, NSET=RIGHT", "U1")
+    row = fx.read_deck(write(tmp_path, text + stepped(*cards))).run().rows[-1]
+    # plane strain: (1 + nu) alpha dT along 2
+    assert row["m[U1 RIGHT]"] == pytest.approx(2.0 * 1.25 * 1e-3 * 50.0, rel=1e-10)
+    assert row["R[LEFT.x]"] == pytest.approx(0.0, abs=1e-10)
+
+
+def test_a_temperature_that_varies_from_node_to_node(tmp_path):
+    text = PLATE.replace("200., 0.25", "200., 0.\n*EXPANSION\n1E-3")
+    text += "*NSET, NSET=CORNER\n3\n*BOUNDARY\n1, 1, 2\n3, 2\n"
+    text += "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 0.\n"
+    cards = ("*TEMPERATURE", "LEFT, 10.", "2, 20.", "5, 20.", "RIGHT, 30.")
+    cards += ("*NODE PRINT, NSET=CORNER", "U1")
+    row = fx.read_deck(write(tmp_path, text + stepped(*cards)), order=2).run().rows[-1]
+    # without stress u = alpha (10 x + 5 x^2 - 5 y^2, 10 y + 10 x y)
+    assert row["m[U1 CORNER]"] == pytest.approx(1e-3 * 40.0, rel=1e-10)
+    assert row["strain_energy"] == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_dynamic_step_runs(tmp_path):
+    text = PLATE.replace("200., 0.25", "200., 0.25\n*DENSITY\n2.") + "*BOUNDARY\nLEFT, PINNED\n"
+    text += "*STEP\n*DYNAMIC, ALPHA=0., DIRECT\n0.01, 0.1\n*CLOAD\nRIGHT, 2, 1.\n*END STEP\n"
+    history = fx.read_deck(write(tmp_path, text)).run()
+    last = history.rows[-1]
+    assert last["time"] == pytest.approx(0.1)
+    assert last["kinetic_energy"] > 0.0
+    assert abs(last["balance"]) < 1e-8 * last["external_work"]  # Newmark conserves energy
+
+
+def test_large_rotations_run(tmp_path):
+    step = stepped("*DSLOAD", "END, TRVEC, 4., 0., 1.", "*BOUNDARY", "LEFT, PINNED")
+    step = step.replace("*STEP", "*STEP, NLGEOM").replace("*DSLOAD", "*DSLOAD, FOLLOWER=NO")
+    small = fx.read_deck(write(tmp_path, PLATE + step.replace(", NLGEOM", ""))).run()
+    large = fx.read_deck(write(tmp_path, PLATE + step)).run()
+    # the arm of the load gets shorter as the body turns: stiffer, but not by much
+    ratio = large.rows[-1]["v[END]"] / small.rows[-1]["v[END]"]
+    assert 0.95 < ratio < 0.9999

@@ -49,6 +49,7 @@ class PairDef:
         row: Its data line.
         slave: Name of the slave surface.
         master: Name of the master surface.
+        title: Name of the interface: that of its slave, with its master where that is not enough.
         bonded: Line of the initial conditions that bonds it, None: not bonded.
         normal_only: Whether the bond holds in the normal direction only.
         debonds: Its ``*DEBOND`` and ``*FRACTURE CRITERION`` cards, with the number of their step.
@@ -58,15 +59,11 @@ class PairDef:
     row: Row
     slave: str
     master: str
+    title: str
     bonded: Row | None = None
     normal_only: bool = False
     debonds: list[tuple[int, Card, Card]] = field(default_factory=list)
     interface: Interface | None = None
-
-    @property
-    def title(self) -> str:
-        """Name of the interface."""
-        return self.slave
 
 
 class Contacts:
@@ -128,7 +125,9 @@ class Contacts:
             row.fail("the slave surface is missing")
         if any(key(p.slave) == key(slave) and key(p.master) == key(master) for p in self.pairs):
             row.fail("this pair is defined already")
-        self.pairs.append(PairDef(row, slave, master))
+        alone = all(key(p.slave) != key(slave) for p in self.pairs)
+        title = slave if alone else f"{slave} on {master}"
+        self.pairs.append(PairDef(row, slave, master, title))
         card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "NODE TO SURFACE")
 
     def _bond(self, row: Row, normal_only: bool) -> None:

@@ -75,8 +75,9 @@ class _Asked:
     ramp: bool | None
     report: Report
 
-    def period(self, length: float, *, ramp: bool) -> Period:
-        return Period(self.start, self.start + length, ramp if self.ramp is None else self.ramp)
+    def period(self, length: float, *, ramp: bool, moving: bool = False) -> Period:
+        chosen = ramp if self.ramp is None else self.ramp
+        return Period(self.start, self.start + length, chosen, moving)
 
 
 def read_procedures(steps: Sequence[Family], report: Report) -> list[Procedure]:
@@ -236,7 +237,7 @@ def _dynamic(asked: _Asked) -> Found:
             "equilibrium or the crack asks for it",
             card,
         )
-    period = asked.period(length, ramp=kind == "QUASI-STATIC")
+    period = asked.period(length, ramp=kind == "QUASI-STATIC", moving=True)
     step = Dynamic(
         until=Time(period.end),
         dt=sizes["initial"],

@@ -34,11 +34,14 @@ class Period:
         start: Total time at its beginning.
         end: At its end.
         ramp: Whether values without an amplitude move linearly over it; else they jump.
+        moving: Whether bodies have inertia: a load that is there from the first moment must find
+            them at rest, not in equilibrium with it.
     """
 
     start: float
     end: float
     ramp: bool = True
+    moving: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +195,7 @@ class Track:
 
     def _put(self, times: Array, values: Array, period: Period) -> None:
         first = float(values[0])
-        if period.start == 0.0:
+        if period.start == 0.0 and not period.moving:
             self.values[0] = first
         elif abs(first - self.values[-1]) > _SAME * max(abs(first), abs(self.values[-1])):
             after = period.start + _JUMP * (period.end - period.start)
@@ -225,7 +228,8 @@ class Track:
         amplitude of total time in all steps keeps its reference value; of others it is 1.
         """
         first = self._made_of[0] if self._made_of else None
-        if first is not None and all(made == first for made in self._made_of):
+        starts = first is None or self.values[0] == first[0] * first[1].values[0]
+        if first is not None and starts and all(made == first for made in self._made_of):
             value, curve = first
             times, values = tuple(curve.times.tolist()), tuple(curve.values.tolist())
             if times == values and times[0] == 0.0:

@@ -11,7 +11,7 @@ import numpy as np
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import Monitor
 from fxcrack.continuum.materials import Plastic
-from fxcrack.deck.cards import Card, key, label, squeeze
+from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
 from fxcrack.deck.constraints import read_links
 from fxcrack.deck.contact import Contacts
 from fxcrack.deck.flat import Flat
@@ -205,7 +205,10 @@ def _monitors(steps: Sequence[Family], flat: Flat, groups: Groups) -> list[Monit
                 continue
             name = card.text("NSET")
             words = {squeeze(text) for row in card.rows() for text in row.fields}
-            nodes = flat.nodes(card, name)
+            try:
+                nodes = flat.nodes(card, name)
+            except DeckError:
+                continue  # an output request must not stop a deck
             nodes = nodes[flat.used[nodes]]
             if not len(nodes):
                 continue

@@ -139,7 +139,7 @@ def _names(model: Any, tdim: int) -> dict[str, tuple[int, int]]:
     """Name, dimension and tag of every physical group, cells first."""
     found: dict[str, tuple[int, int]] = {}
     for dim, tag in sorted(model.getPhysicalGroups(), key=lambda group: (-group[0], group[1])):
-        name = model.getPhysicalName(dim, tag) or f"group_{dim}_{tag}"
+        name = model.getPhysicalName(dim, tag).strip() or f"group_{dim}_{tag}"
         if name in found:
             raise MeshError(
                 f"the name '{name}' is used for physical groups of dimension {found[name][0]} and "
