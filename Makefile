@@ -23,6 +23,9 @@ lint: $(ready) ## style, format, types
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 
+docs: $(ready) ## the documentation, in out/docs; warnings are errors
+	.venv/bin/python -m sphinx -qW --keep-going -d out/docs-cache docs out/docs
+
 bench: $(ready) ## the speed problems beside what a careful script does
 	mkdir -p out/bench
 	.venv/bin/fxcrack bench dcb2d --baseline --json out/bench/dcb2d.json
@@ -38,4 +41,4 @@ distclean: clean ## remove the environment too
 $(ready): pyproject.toml .ci/bootstrap
 	.ci/bootstrap
 
-.PHONY: help demo smoke test test-slow test-all lint bench clean distclean
+.PHONY: help demo smoke test test-slow test-all lint docs bench clean distclean

@@ -7,7 +7,7 @@
 #
 # A study of one's own is a function that takes a `Setting` and returns a `Case`: the scene in that
 # discretisation, the step, and how to read load, G and crack length off the history.
-"""Accuracy against time: every number and picture of the README's section, computed anew."""
+"""Accuracy against time: every number and picture of docs/howto/accuracy.md, computed anew."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def main(out: Path, fine: bool = False) -> None:
             shutil.copyfile(out / name / f"{kind}.png", out / f"accuracy_{name}_{kind}.png")
         results.append(result)
     (out / "README.md").write_text(report.summary(results), encoding="utf-8")
-    console.print(f"pictures accuracy_*.png and the tables of the README (README.md) are in {out}")
+    console.print(f"pictures accuracy_*.png and their tables (README.md) are in {out}")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 # # What is verified against what
 #
-# Runs the demos in their default size and prints the table of the README.
-"""The verification table of the README, computed anew."""
+# Runs the demos in their default size and prints the table of docs/verification.md.
+"""The verification table of docs/verification.md, computed anew."""
 
 from __future__ import annotations
 

@@ -5,12 +5,14 @@ import warnings
 from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # noqa: F401  # isort: skip  (orders MPI before DOLFINx)
-from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.base.errors import EnergyError, FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
     Amplitude,
     BodyForce,
@@ -51,6 +53,7 @@ from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
 from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
+from fxcrack.output.plies import PlyResults, ply_results
 from fxcrack.output.tables import (
     BondHistory,
     bond_table,
@@ -111,6 +114,7 @@ __all__ = [
     "ByTemperature",
     "Checkpoint",
     "CondensedOptions",
+    "ContinuumShell",
     "CrackLength",
     "CrackLengthVsTime",
     "CrackOpening",
@@ -121,6 +125,7 @@ __all__ = [
     "Deck",
     "Displacement",
     "Dynamic",
+    "EnergyError",
     "EnhancedVCCT",
     "Evaluator",
     "Fatigue",
@@ -133,6 +138,7 @@ __all__ = [
     "Interface",
     "Interrupted",
     "Isotropic",
+    "Laminate",
     "Mesh",
     "Monitor",
     "NeoHookean",
@@ -142,6 +148,8 @@ __all__ = [
     "PlaneStrain",
     "PlaneStress",
     "Plastic",
+    "Ply",
+    "PlyResults",
     "PointForce",
     "Power",
     "Pressure",
@@ -166,6 +174,7 @@ __all__ = [
     "displacement_function",
     "from_dolfinx",
     "mesh_from_gmsh",
+    "ply_results",
     "read_deck",
     "read_mesh",
     "tip_table",

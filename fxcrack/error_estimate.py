@@ -14,6 +14,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any, Protocol, Self
 
+from fxcrack.base.checks import number_or_nan
 from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.history import History, Row
 from fxcrack.steps.analysis import Analysis
@@ -130,7 +131,7 @@ def check_accuracy(accuracy: float) -> None:
     Raises:
         InputError: It does not lie between 0 and 1.
     """
-    if not 0.0 < accuracy < 1.0:
+    if not 0.0 < number_or_nan("run", "accuracy", accuracy) < 1.0:
         raise InputError(f"accuracy = {accuracy}: give a relative error between 0 and 1, e.g. 0.01")
 
 

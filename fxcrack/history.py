@@ -9,8 +9,9 @@ time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[.
 its work-conjugate displacement, m[..] monitored displacement, a[..] crack length, area[..] open
 area, f[..] largest criterion value and GI, GII, GIII[..] there, node[..] where, released[..]
 number of released nodes; strain_energy, external_work, released_energy, balance; where they occur
-viscous_energy, snap_energy (part of released_energy), and in fatigue steps N, G_max[..], dG[..],
-dadN[..].
+viscous_energy, snap_energy (part of released_energy), overlap_energy (given by contact as it pushes
+overlapping faces apart), initial_kinetic_energy (of a given velocity), and in fatigue steps N,
+G_max[..], dG[..], dadN[..].
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fxcrack.base.checks import number
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -85,8 +87,8 @@ class History:
             InputError: No row has the column.
             IndexError: There are fewer rows.
         """
-        if isinstance(column, int):
-            return self.rows[column]
+        if isinstance(column, int | np.integer):
+            return self.rows[int(column)]
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])
@@ -97,6 +99,7 @@ class History:
         Raises:
             InputError: There is no such row, column or event.
         """
+        value = number("history.at", column, value)
         for row in self.rows:
             found = row.get(column, np.nan)
             if event is not None and row["event"] != event:

@@ -12,7 +12,17 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import check_amplitudes, check_instance, check_list, warn_of_same_titles
+from fxcrack.base.checks import (
+    check_amplitudes,
+    check_instance,
+    check_list,
+    flag,
+    is_function,
+    list_of,
+    shown,
+    text,
+    warn_of_same_titles,
+)
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
@@ -49,7 +59,8 @@ from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond, check_friction
-from fxcrack.steps.end_conditions import CrackLength
+from fxcrack.steps.end_conditions import CrackLength, Time
+from fxcrack.steps.energy_check import check_energy
 from fxcrack.steps.progress import Progress
 from fxcrack.steps.quasi_static import run_static
 from fxcrack.steps.rows import Observer
@@ -102,17 +113,35 @@ class SceneInput:
             check_instance(
                 "Scene", "options", self.options, CondensedOptions, "CondensedOptions(rows=2.0)"
             )
-        if not isinstance(self.effects, Sequence):
+        if list_of(self.effects) is None:
             raise InputError(
                 f"Scene: effects must be a list, not {type(self.effects).__name__}; write "
                 "effects=[...]"
             )
+        self._check_materials()
+        text("Scene", "solver", self.solver, optional=True)
         titles = [i.title for i in self.interfaces]
         for title in titles:
             if titles.count(title) > 1:
                 raise InputError(
                     f"interface '{title}' appears twice; give one criterion per interface and "
                     "different names to different interfaces"
+                )
+
+    def _check_materials(self) -> None:
+        """Check that each material is one, and each key of a dictionary a name."""
+        listed: list[Any] = [self.materials]
+        if isinstance(self.materials, Mapping):
+            listed = list(self.materials.values())
+            for name in self.materials:
+                text("Scene: materials", "a cell group", name)
+            if not self.materials:
+                raise InputError("Scene: materials is empty; give one, e.g. Isotropic(70e3, 0.3)")
+        for material in listed:
+            if isinstance(material, type) or not hasattr(material, "stiffness"):
+                raise InputError(
+                    f"materials: {shown(material)} is not a material; give one, e.g. "
+                    "Isotropic(E=70e3, nu=0.3), or one per cell group, {'name': Isotropic(...)}"
                 )
 
     def _take_list(self, name: str, kinds: type | tuple[type, ...]) -> None:
@@ -291,6 +320,8 @@ class Scene:
                 any number of ranks.
 
         Raises:
+            EnergyError: The energies of the step do not balance to 1 % of the largest one (beyond
+                0.1 % it is a warning). The history is kept.
             AccuracyError: The accuracy is not reached, or cannot be judged; says what would reach
                 it. The history is kept.
             InputError: The scene and the step are not compatible, or the checkpoint belongs to
@@ -299,6 +330,13 @@ class Scene:
         """
         if accuracy is not None:
             check_accuracy(accuracy)
+        progress, restart = flag("run", "progress", progress), flag("run", "restart", restart)
+        observers = _checked_observers(observers)
+        if checkpoint is not None:
+            example = "Checkpoint('run.npz')"
+            check_instance("run", "checkpoint", checkpoint, Checkpoint, example)
+        if save is not None:
+            check_instance("run", "save", save, (str, Path), "'history.csv'")
         check_instance("run", "step", step, (Static, Cycles), "Static(until=Time(1.0))")
         chosen = self.debonds if grow is None else check_list("run", "grow", grow, Debond)
         self._check_step(step, chosen)
@@ -311,10 +349,12 @@ class Scene:
                 log.warn("%s, so nothing can debond", why_no_tip(g.front))
         restarts = self._files.manager(analysis, step, may_grow, checkpoint, restart, save)
         self._prepare(restarts, may_grow, step)
+        first = len(self.history)
         self.history.reason = restarts.finished or self._go(
             step, restarts, progress=progress, observers=observers
         )
         self.history.details = self._details()
+        check_energy(self.history, first)
         if accuracy is not None:
             self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
         return self.history
@@ -325,6 +365,12 @@ class Scene:
             if debond not in self.debonds:
                 raise InputError(
                     f"debond of interface '{debond.interface.title}' is not part of the scene"
+                )
+        for end in step.ends:
+            if isinstance(end, Time) and end.time < self.time * (1.0 - 1e-12):
+                raise InputError(
+                    f"Time({end.time:g}) is past: the scene is at time {self.time:g} already; give "
+                    "a later end"
                 )
         check_criteria(step, chosen)
         effects, why = self.analysis.effects, self.analysis.plan.why
@@ -351,6 +397,7 @@ class Scene:
             for pair, held in zip(self.pairs, solver.held_by_supports, strict=True):
                 warn_of_held_bonds(pair, held)
             solver.start()
+            analysis.book_start()
         analysis.started = True
 
     def _go(
@@ -425,10 +472,27 @@ class Scene:
     def close(self) -> None:
         """Free all PETSc objects; collective. The history stays.
 
-        On one rank this happens by itself when the scene is no longer used. On several it does not:
-        close scenes made in a loop, for MPI has a limited number of communicators.
+        It happens by itself when the scene is no longer used: on one rank at once, on several when
+        the next scene is made there.
         """
         self.solver.destroy()
+
+
+def _checked_observers(observers: object) -> Sequence[Observer]:
+    """The observers of a run as a list.
+
+    Raises:
+        InputError: They are not in a list, or one cannot be called.
+    """
+    found = list_of(observers)
+    if found is None:
+        raise InputError("run: observers must be a list; write observers=[...]")
+    for i, observe in enumerate(found):
+        if not is_function(observe):
+            raise InputError(
+                f"run: observers[{i}] is {type(observe).__name__}; give a function of (event, row)"
+            )
+    return found
 
 
 def _solver_of_path(path: str, solver: str | None) -> str:

@@ -32,8 +32,8 @@ import fxcrack  # noqa: F401 - before petsc4py
 import hypothesis
 import pytest
 from mpi4py import MPI
-from petsc4py import PETSc
 
+from fxcrack.base import collective_garbage
 from fxcrack.base.parallel import end_all
 
 # Same examples on every rank and in every run; compilation of forms makes first examples slow.
@@ -221,5 +221,5 @@ def _free_petsc_objects() -> Iterator[None]:
     """Free the PETSc objects of a test on all ranks together: freeing them is collective."""
     yield
     gc.collect()
-    PETSc.garbage_cleanup()
+    collective_garbage.collect(WORLD)
     WORLD.Barrier()

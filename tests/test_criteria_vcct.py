@@ -282,8 +282,8 @@ def test_shear_modes_default_to_the_mode_before() -> None:
         (lambda x: x[:, 0], r"GIc = 0\.0 at slave node 1; .* not at slave node 1"),
         (lambda x: np.where(x[:, 0] > 1.0, np.nan, 1.0), r"not at slave nodes 3, 4"),
         (
-            lambda x: x[0],
-            r"returned shape \(2,\) for positions of shape \(3, 2\); it must return 3",
+            lambda x: np.ones(7),
+            r"GIc gives shape \(7,\) for positions x of shape \(3, 4\); one number per position",
         ),
         (Tabulated([0.0, 1.0], [1.0, 2.0]), "depends on temperature, but the debond has none"),
     ],

@@ -111,7 +111,7 @@ def test_nodal_energy_rates_with_generate(tmp_path):
     )
     words = "TYPE=VCCT, NODAL ENERGY RATE"
     found = criterion(tmp_path, words, "9., 9., 9., 2.", model=BONDED + rates)
-    x = np.array([[0.0, 1.0], [2.0, 1.0], [3.0, 1.0], [4.0, 1.0]])
+    x = np.array([[0.0, 2.0, 3.0, 4.0], [1.0, 1.0, 1.0, 1.0], [0.0, 0.0, 0.0, 0.0]])
     assert found.GIc(x) == pytest.approx([0.5, 0.7, 0.8, 0.9])
     assert found.GIIc(x) == pytest.approx([1.0, 1.4, 1.6, 1.8])
     less = bonded(

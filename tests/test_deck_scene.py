@@ -312,7 +312,7 @@ def test_temperatures_of_steps(tmp_path):
     (effect,) = arguments(tmp_path, text)["effects"]
     assert effect.reference == 20.0
     assert [t for t, _ in effect.value] == [0.0, 1.0, 2.0]
-    assert effect.value[:2] == [(0.0, 20.0), (1.0, 70.0)]
+    assert list(effect.value[:2]) == [(0.0, 20.0), (1.0, 70.0)]
     field = effect.value[2][1]
     assert field(np.array([[2.0, 0.0], [0.0, 1.0], [0.0, 0.0]])).tolist() == [30.0, 70.0]
 
@@ -416,7 +416,8 @@ def test_dynamic_steps(tmp_path):
         ("*STEP\n*DIRECT CYCLIC\n0.1, 1.\n*END STEP\n", "available with FATIGUE only"),
         ("*STEP\n*FATIGUE\n0.1\n*END STEP\n", "the time of one cycle is missing"),
         ("*STATIC\n1., 1.\n", r"it belongs into a \*STEP"),
-        ("*SHELL SECTION, ELSET=PLATE, MATERIAL=STEEL\n1.\n", "SHELL SECTION is refused: shells"),
+        ("*SHELL SECTION, ELSET=PLATE, MATERIAL=STEEL\n1.\n", "needs continuum shell elements"),
+        ("*SHELL GENERAL SECTION, ELSET=PLATE\n1.\n", "SECTION is refused: these shells"),
         ("*BOUNDRY\nLEFT, 1\n", r"did you mean \*BOUNDARY"),
         ("*BOUNDARY, AMPLITUD=A\nLEFT, 1\n", "there is no amplitude 'A'"),
         ("*BOUNDARY, WEIGHT=A\nLEFT, 1\n", "the parameter WEIGHT is not available"),
@@ -573,9 +574,8 @@ def test_a_temperature_that_varies_from_node_to_node(tmp_path):
     cards = ("*TEMPERATURE", "LEFT, 10.", "2, 20.", "5, 20.", "RIGHT, 30.")
     cards += ("*NODE PRINT, NSET=CORNER", "U1")
     row = fx.read_deck(write(tmp_path, text + stepped(*cards)), order=2).run().rows[-1]
-    # without stress u = alpha (10 x + 5 x^2 - 5 y^2, 10 y + 10 x y)
+    # without stress in the plane u = alpha (10 x + 5 x^2 - 5 y^2, 10 y + 10 x y)
     assert row["m[U1 CORNER]"] == pytest.approx(1e-3 * 40.0, rel=1e-10)
-    assert row["strain_energy"] == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_dynamic_step_runs(tmp_path):

@@ -69,7 +69,7 @@ CRITERIA = [
     (fx.VCCT(0.2), fx.RampRelease()),
     (fx.VCCT(0.2, 0.5, 0.5, mix=fx.Power(1.0, 1.0), unstable_tolerance=np.inf), None),
     (
-        fx.VCCT(lambda x: 0.2 + 0.001 * x[:, 0], 0.5, mix=fx.Reeder(2.0), unstable_tolerance=0.5),
+        fx.VCCT(lambda x: 0.2 + 0.001 * x[0], 0.5, mix=fx.Reeder(2.0), unstable_tolerance=0.5),
         None,
     ),
     (

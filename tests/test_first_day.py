@@ -135,7 +135,7 @@ def test_pressure_by_functions(comm: MPI.Comm) -> None:
         )
         times.append(history.rows[-1]["time"])
     assert times[0] == pytest.approx(times[1], rel=1e-12) == pytest.approx(times[2], rel=1e-12)
-    with pytest.raises(fx.InputError, match=r"gives shape \(4,\) at .* one number per position"):
+    with pytest.raises(fx.InputError, match=r"gives shape \(4,\) for .* one number per position"):
         specimen(mesh(comm), supports=HELD_FAR, loads=loads(lambda x: np.ones(4))).run(
             fx.Static(until=fx.Releases(1))
         )

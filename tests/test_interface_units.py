@@ -20,7 +20,7 @@ def front(nodes, area):
     none = np.zeros((n, 2, 2))
     return Tips(
         np.array(nodes), none[..., 0].astype(int), none.astype(int), none, np.zeros((n, 3, 3)),
-        zero, zero, zero, np.array(area, dtype=float),
+        zero, zero, zero, np.array(area, dtype=float), zero > 0.0,
     )  # fmt: skip
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import Any
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base import log
+from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
 
 
@@ -25,11 +27,15 @@ def check_list(owner: str, name: str, value: Any, kinds: type | tuple[type, ...]
         InputError: A single part without its list, or a part of another kind.
     """
     wanted = " or ".join(k.__name__ for k in (kinds if isinstance(kinds, tuple) else (kinds,)))
-    if isinstance(value, kinds) or not isinstance(value, Iterable):
+    no_list = isinstance(value, str | bytes | Mapping) or not isinstance(value, Iterable)
+    if isinstance(value, kinds) or no_list:
         raise InputError(
             f"{owner}: {name} must be a list of {wanted}, not {_kind(value)}; write {name}=[...]"
         )
-    parts = list(value)
+    try:
+        parts = list(value)
+    except Exception as error:  # an array of shape (), a user's own iterator
+        raise InputError(f"{owner}: {name} cannot be read as a list: {error}") from error
     for i, part in enumerate(parts):
         if not isinstance(part, kinds):
             raise InputError(f"{owner}: {name}[{i}] is {_kind(part)}; it must be a {wanted}")
@@ -104,20 +110,45 @@ def format_point(point: npt.ArrayLike) -> str:
 
 
 def number(owner: str, name: str, value: object) -> float:
-    """Return ``value`` as a float.
+    """Return ``value`` as a float; numbers of numpy and arrays of shape () are numbers.
 
     Raises:
-        InputError: ``value`` is not a number, or NaN.
+        InputError: ``value`` is not a real number, or NaN.
     """
-    try:
-        if isinstance(value, str):
-            raise TypeError
-        result = float(value)  # type: ignore[arg-type]
-    except (TypeError, ValueError):
-        raise InputError(f"{owner}: {name} = {value!r} is not a number; give one") from None
-    if np.isnan(result):
+    result = as_float(value)
+    if result is None:
+        raise InputError(f"{owner}: {name} = {shown(value)} is not a number; give one")
+    if math.isnan(result):
         raise InputError(f"{owner}: {name} is NaN; give a number")
     return result
+
+
+def as_float(value: object) -> float | None:
+    """A real number as a float, None where it is none; too large ones are infinite."""
+    if isinstance(value, str | bytes | bool | np.bool_ | type | complex | np.complexfloating):
+        return None
+    if isinstance(value, np.ndarray) and (value.ndim > 0 or value.dtype.kind not in "fiu"):
+        return None
+    try:
+        return float(value)  # type: ignore[arg-type]
+    except OverflowError:
+        return math.inf
+    except Exception:  # whatever the conversion of a foreign type raises: it is no number
+        return None
+
+
+def _ranged(owner: str, name: str, value: object, good: bool, words: str) -> None:
+    """Raise unless ``good``; ``words`` say what the value must be."""
+    if not good:
+        # NaN is said twice, as it passes for a number in the value and for none in the words
+        nan = f"{name} is NaN; " if as_float(value) != as_float(value) else ""
+        raise InputError(f"{owner}: {nan}{name} = {value} must be {words}")
+
+
+def number_or_nan(owner: str, name: str, value: object) -> float:
+    """As :func:`number`, but NaN is returned, for a caller who says what range it is out of."""
+    found = as_float(value)
+    return number(owner, name, value) if found is None else found
 
 
 def positive(owner: str, **values: object) -> None:
@@ -127,8 +158,8 @@ def positive(owner: str, **values: object) -> None:
         InputError: One is not.
     """
     for name, value in values.items():
-        if not 0.0 < number(owner, name, value) < np.inf:
-            raise InputError(f"{owner}: {name} = {value} must be positive and finite")
+        good = 0.0 < number_or_nan(owner, name, value) < np.inf
+        _ranged(owner, name, value, good, "positive and finite")
 
 
 def not_negative(owner: str, **values: object) -> None:
@@ -138,8 +169,182 @@ def not_negative(owner: str, **values: object) -> None:
         InputError: One is not.
     """
     for name, value in values.items():
-        if not 0.0 <= number(owner, name, value) < np.inf:
-            raise InputError(f"{owner}: {name} = {value} must be zero or positive, and finite")
+        good = 0.0 <= number_or_nan(owner, name, value) < np.inf
+        _ranged(owner, name, value, good, "zero or positive, and finite")
+
+
+def finite(owner: str, **values: object) -> None:
+    """Check that every named value is a finite number.
+
+    Raises:
+        InputError: One is not.
+    """
+    for name, value in values.items():
+        good = math.isfinite(number_or_nan(owner, name, value))
+        _ranged(owner, name, value, good, "finite")
+
+
+def between(
+    owner: str, name: str, value: object, low: float, high: float, *, ends: bool = True
+) -> None:
+    """Check that a number lies in a range.
+
+    Args:
+        owner: What is being made, for the message.
+        name: The argument.
+        value: What the user gave.
+        low: Lower end of the range.
+        high: Upper end of the range.
+        ends: Whether the ends belong to it.
+
+    Raises:
+        InputError: It does not, or is no number.
+    """
+    x = number_or_nan(owner, name, value)
+    good = low <= x <= high if ends else low < x < high
+    if not good:
+        nan = f"{name} is NaN; " if x != x else ""
+        words = f"between {low:g} and {high:g}" + ("" if ends else " (exclusive)")
+        raise InputError(f"{owner}: {nan}{name} = {value} must lie {words}")
+
+
+def whole(owner: str, name: str, value: object, *, least: int = 1, words: str = "") -> int:
+    """Return a count as an int; floats without a fraction, 1e4, are counts as well.
+
+    Args:
+        owner: What is being made, for the message.
+        name: The argument.
+        value: What the user gave.
+        least: Smallest count allowed.
+        words: What to do, for the message; empty for nothing beyond the range.
+
+    Raises:
+        InputError: It is not a whole number, or less than ``least``.
+    """
+    x = number(owner, name, value)
+    if not (math.isfinite(x) and x == math.floor(x) and x >= least):
+        more = f"; {words}" if words else ""
+        raise InputError(
+            f"{owner}: {name} = {value} must be a whole number, at least {least}{more}"
+        )
+    return int(x)
+
+
+def flag(owner: str, name: str, value: object) -> bool:
+    """Return a truth value as a bool; 0 and 1 are truth values as well.
+
+    Raises:
+        InputError: It is anything else: the text "no" would count as true.
+    """
+    if isinstance(value, bool | np.bool_) or (
+        isinstance(value, int | np.integer) and value in (0, 1)
+    ):
+        return bool(value)
+    raise InputError(f"{owner}: {name} = {shown(value)} must be True or False")
+
+
+def text(owner: str, name: str, value: object, *, optional: bool = False) -> None:
+    """Check that a name is a text that is not empty.
+
+    Args:
+        owner: What is being made, for the message.
+        name: The argument.
+        value: What the user gave.
+        optional: Whether None stands for no name.
+
+    Raises:
+        InputError: It is not.
+    """
+    if value is None and optional:
+        return
+    if not isinstance(value, str) or not value:
+        other = "; None for the default" if optional else ""
+        raise InputError(f"{owner}: {name} = {shown(value)} must be a name, a text{other}")
+
+
+def numbers(
+    owner: str, name: str, value: object, n: int | None = None, *, words: str = ""
+) -> tuple[float, ...]:
+    """Return a list of finite numbers as a tuple of floats.
+
+    Args:
+        owner: What is being made, for the message.
+        name: The argument.
+        value: What the user gave: a list, a tuple or an array of shape (n,).
+        n: How many there must be; None for any number, at least one.
+        words: What they are, for the message.
+
+    Raises:
+        InputError: It is no flat list, of another length, or an entry is not a finite number.
+    """
+    entries = list_of(value)
+    count = "some" if n is None else f"{n}"
+    if entries is None or not entries or (n is not None and len(entries) != n):
+        more = f", {words}" if words else ""
+        raise InputError(f"{owner}: {name} = {shown(value)} must be {count} numbers{more}")
+    for i, entry in enumerate(entries):
+        finite(owner, **{f"{name}[{i}]": entry})
+    return tuple(number(owner, name, entry) for entry in entries)
+
+
+def list_of(value: object) -> list[Any] | None:
+    """The entries of a list, a tuple or an array of at least one dimension; None for others."""
+    if isinstance(value, np.ndarray):
+        return list(value) if value.ndim > 0 else None
+    if isinstance(value, str | bytes | Mapping) or not isinstance(value, Sequence):
+        return None
+    return list(value)
+
+
+def is_count(value: object) -> bool:
+    """Whether a value is of a type of whole numbers; truth values are not."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def is_function(value: object) -> TypeGuard[Callable[..., Any]]:
+    """Whether a value can stand for a function of position: callable, and no class."""
+    return callable(value) and not isinstance(value, type)
+
+
+def number_or_function(owner: str, name: str, value: object) -> None:
+    """Check that a value is a finite number or a function of position.
+
+    Raises:
+        InputError: It is neither.
+    """
+    if is_function(value):
+        return
+    found = as_float(value)
+    if found is None:
+        raise InputError(
+            f"{owner}: {name} = {shown(value)} is not a number; give one, or a function of position"
+        )
+    if not math.isfinite(found):
+        raise InputError(f"{owner}: {name} is not a finite number ({name} = {found}); give one")
+
+
+def keep(frozen: Any, **values: object) -> None:
+    """Set attributes of a frozen dataclass, while it is being made."""
+    for name, value in values.items():
+        object.__setattr__(frozen, name, value)
+
+
+def keep_floats(frozen: Any, *names: str) -> None:
+    """Make floats of checked numbers of a frozen dataclass; None stays."""
+    for name in names:
+        value = getattr(frozen, name)
+        if value is not None:
+            object.__setattr__(frozen, name, as_float(value))
+
+
+def shown(value: object) -> str:
+    """A value as messages show it, cut to one line, whatever its class says of itself."""
+    try:
+        shown = repr(value)
+    except Exception:  # a user's own class may fail to describe itself
+        shown = f"a {type(value).__name__}"
+    shown = " ".join(shown.split())
+    return shown if len(shown) <= 80 else f"{shown[:77]}..."
 
 
 def one_of(owner: str, name: str, value: object, known: Sequence[str]) -> None:
@@ -148,8 +353,10 @@ def one_of(owner: str, name: str, value: object, known: Sequence[str]) -> None:
     Raises:
         InputError: It is not; the message lists the known words.
     """
-    if value not in known:
-        raise InputError(f"{owner}: {name} = {value!r} is unknown; choose from {', '.join(known)}")
+    if not isinstance(value, str) or value not in known:
+        raise InputError(
+            f"{owner}: {name} = {shown(value)} is unknown; choose from {', '.join(known)}"
+        )
 
 
 def table(
@@ -166,17 +373,13 @@ def table(
     Raises:
         InputError: A column is empty, not finite or of another length, or ``x`` does not increase.
     """
-    try:
-        columns = [np.atleast_1d(np.asarray(c, dtype=np.float64)) for c in (x, y)]
-    except (TypeError, ValueError):
-        raise InputError(f"{owner}: {names[0]} and {names[1]} must be lists of numbers") from None
-    a, b = columns
+    a, b = (_column(owner, names, column) for column in (x, y))
     if a.ndim != 1 or a.shape != b.shape or a.size == 0:
         raise InputError(
             f"{owner}: {names[0]} has shape {a.shape} and {names[1]} has {b.shape}; "
             "give two lists of the same length, at least one entry each"
         )
-    for name, column in zip(names, columns, strict=True):
+    for name, column in zip(names, (a, b), strict=True):
         bad = np.flatnonzero(~np.isfinite(column))
         if bad.size:
             raise InputError(
@@ -190,3 +393,12 @@ def table(
             f"entry {i} ({a[i]:g}); sort the table and remove repeated entries"
         )
     return tuple(a.tolist()), tuple(b.tolist())
+
+
+def _column(owner: str, names: tuple[str, str], given: object) -> Array:
+    """One column of a table as an array; a single number is a column of one entry."""
+    entries = [given] if list_of(given) is None else list_of(given)
+    found = [as_float(entry) for entry in entries or []]
+    if any(x is None for x in found):
+        raise InputError(f"{owner}: {names[0]} and {names[1]} must be lists of numbers")
+    return np.array(found, dtype=np.float64)

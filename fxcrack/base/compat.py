@@ -172,8 +172,9 @@ def interpolation_points(space_or_element: Any) -> npt.NDArray[np.float64]:
 
 def create_vector(form_or_space: Any) -> PETSc.Vec:
     """Zero ghosted vector of a function space or of a compiled linear form on it; collective."""
-    dofmap = getattr(form_or_space, "function_spaces", [form_or_space])[0].dofmap
+    space = getattr(form_or_space, "function_spaces", [form_or_space])[0]
+    dofmap = space.dofmap
     layout, bs = dofmap.index_map, dofmap.index_map_bs
     size = (layout.size_local * bs, layout.size_global * bs)
     ghosts = layout.ghosts.astype(PETSc.IntType)
-    return PETSc.Vec().createGhost(ghosts, size, bsize=bs, comm=layout.comm)
+    return PETSc.Vec().createGhost(ghosts, size, bsize=bs, comm=space.mesh.comm)

@@ -40,6 +40,18 @@ class ComesApart(ConvergenceError):
     """Total separation: the load exceeds what the remaining interface carries."""
 
 
+class EnergyError(FxcrackError, RuntimeError):
+    """The energies of a step do not balance; the history is kept.
+
+    Attributes:
+        imbalance: The part of the largest energy that is missing, or that came out of nothing.
+    """
+
+    def __init__(self, message: str, imbalance: float) -> None:
+        super().__init__(message)
+        self.imbalance = imbalance
+
+
 def raise_on_all_ranks(
     comm: MPI.Comm, problem: str | None, error: type[FxcrackError] = InputError
 ) -> None:

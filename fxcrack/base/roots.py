@@ -1,15 +1,20 @@
-"""The root of a function between two places where it has different signs."""
+"""Roots of functions between two places where they have different signs.
+
+:func:`bracketed_root` calls the function as often as it needs; :class:`Bracket` is for searches in
+which every trial is an equilibrium that the caller looks for.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-_ROUND_OFF = 1e-15
-"""A bracket smaller than this part of its upper end is not divided any more."""
-_SECANTS = 3
-"""Secants that may fail to halve the bracket before it is halved itself."""
-_MOST = 600
-"""Evaluations, more than halving needs from the largest to the smallest numbers."""
+import numpy as np
+from scipy.optimize import brentq
+
+_MOST = 2200
+"""Evaluations: halving from the largest to the smallest numbers needs fewer."""
+_SLACK = 3
+"""Trials by which a search may be slower than halving."""
 
 
 def bracketed_root(
@@ -21,10 +26,7 @@ def bracketed_root(
     *,
     close: float,
 ) -> float:
-    """Root by secants with the Illinois weights, and by halving where they are slow.
-
-    A linear function is solved by the first secant. Four evaluations halve the bracket at least, so
-    that their number is bounded whatever the function is.
+    """Root by the method of Brent (1973): secants and inverse parabolas, guarded by halving.
 
     Args:
         function: The function.
@@ -35,25 +37,58 @@ def bracketed_root(
         close: Values below this are zero.
 
     Returns:
-        The root, or the upper end of a bracket that round-off does not divide.
+        The root, or, where round-off does not come closer or the function jumps, the upper end of
+        the last bracket.
     """
-    rising = f_high >= 0.0
-    width, tried = high - low, 0
-    for _ in range(_MOST):
-        x, tried = low - f_low * (high - low) / (f_high - f_low), tried + 1
-        if tried > _SECANTS or not low < x < high:
-            x, width, tried = 0.5 * (low + high), 0.5 * (high - low), 0
-        if not low < x < high:
-            break
-        value = function(x)
-        if abs(value) < close:
-            return x
-        if (value >= 0.0) == rising:
-            high, f_high, f_low = x, value, 0.5 * f_low
-        else:
-            low, f_low, f_high = x, value, 0.5 * f_high
-        if high - low < _ROUND_OFF * high:
-            break
-        if high - low <= 0.5 * width:
-            width, tried = high - low, 0
-    return high
+    known = {low: f_low, high: f_high}
+    end = high
+
+    def value(x: float) -> float:
+        nonlocal end
+        y = known[x] if x in known else function(x)
+        if abs(y) < close:
+            end = x
+            return 0.0
+        if (y >= 0.0) == (f_high >= 0.0):
+            end = min(end, x)
+        return y
+
+    brentq(
+        value, low, high, xtol=float(np.finfo(float).tiny), rtol=4.0 * np.finfo(float).eps,
+        maxiter=_MOST, disp=False,
+    )  # fmt: skip
+    return end
+
+
+class Bracket:
+    """Keeps a search by any guesses at most a few trials behind halving.
+
+    After j trials the bracket is at most 2^(3 - j) times as wide as the first one: guesses near one
+    end are moved towards the middle as far as that needs, the projection of the ITP method
+    (Oliveira and Takahashi 2020).
+
+    Args:
+        low: One end of the first bracket.
+        high: The other.
+
+    Attributes:
+        trials: Guesses admitted so far.
+    """
+
+    def __init__(self, low: float, high: float) -> None:
+        self._limit = abs(high - low) * 2.0**_SLACK
+        self.trials = 0
+
+    def admit(self, guess: float, low: float, high: float) -> float:
+        """The guess, or the place nearest to it that narrows the bracket enough.
+
+        Args:
+            guess: Where the root is expected.
+            low: One end of the present bracket.
+            high: The other, in any order.
+        """
+        self.trials += 1
+        self._limit *= 0.5
+        low, high = min(low, high), max(low, high)
+        reach = max(self._limit, 0.5 * (high - low))
+        return min(max(guess, high - reach), low + reach)

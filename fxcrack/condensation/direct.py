@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base import compat
@@ -28,6 +29,9 @@ from fxcrack.condensation.mumps_schur import (
     mumps_message,
 )
 from fxcrack.interface.jump_coordinates import JumpCoordinates
+
+_LARGE = 1e150
+"""Entries whose squares, which S is made of, exceed the largest number there is."""
 
 
 class DirectCondensation:
@@ -97,12 +101,11 @@ class DirectCondensation:
         """Take S out of a factorisation of the matrix, or build it; collective."""
         start = time.perf_counter()
         if self._by_schur:
-            if self._factor is None:
-                self._factor = SchurFactor(
-                    self.matrix, self.coordinates.n_last, gdim=gdim, definite=self._definite
-                )
-            else:
-                self._factor.renew(self.matrix)
+            try:
+                self._factorise(gdim)
+            except SolverError as error:
+                raise SolverError(self._why_not(str(error))) from error
+            assert self._factor is not None
             self.n_negative = self._factor.n_negative
             self.timings.factorizations += 1
             self.schur = self._factor.schur
@@ -113,7 +116,37 @@ class DirectCondensation:
             self.schur = self._columns()
         self.timings.add("factor_with_schur", start)
         if not np.all(np.isfinite(self.schur)):
-            raise SolverError(mumps_message(-10, 0))
+            raise SolverError(self._why_not(mumps_message(-10, 0)))
+
+    def _factorise(self, gdim: int) -> None:
+        if self._factor is None:
+            self._factor = SchurFactor(
+                self.matrix, self.coordinates.n_last, gdim=gdim, definite=self._definite
+            )
+        else:
+            self._factor.renew(self.matrix)
+
+    def _why_not(self, otherwise: str) -> str:
+        """Why there is no S, in words: numbers that are none or too large, or what else was said.
+
+        Collective.
+        """
+        data = self.matrix.getValuesCSR()[2]
+        good = bool(np.all(np.isfinite(data)))
+        largest = float(np.abs(data).max(initial=0.0)) if good else np.inf
+        entries = self._comm.allreduce(largest, op=MPI.MAX)
+        if not np.isfinite(entries):
+            return (
+                "the stiffness matrix or a load pattern holds entries that are no finite numbers; "
+                "look for NaN and for numbers that are too large in materials, loads and mesh"
+            )
+        if entries > _LARGE:
+            return (
+                f"numbers are too large to compute with: the largest entry of stiffness and load "
+                f"patterns is {entries:.1e}, and its square overflows; state moduli and loads of a "
+                "size that is physical in your units"
+            )
+        return otherwise
 
     def _last_diagonal(self) -> Array:
         """Diagonal of A on the last coordinates, the same on every rank; collective."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fxcrack.base.checks import number, shown
 from fxcrack.base.errors import InputError
 
 METHODS = ("auto", "schur", "columns", "iterative")
@@ -36,8 +37,13 @@ class CondensedOptions:
     rtol: float = 1e-6
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
+        owner = "CondensedOptions"
+        if not isinstance(self.method, str) or self.method not in METHODS:
             names = ", ".join(f"'{m}'" for m in METHODS)
-            raise InputError(f"method = '{self.method}': choose one of {names}")
-        if not 1e-12 <= self.rtol <= 1e-2:
+            raise InputError(f"method = {shown(self.method)}: choose one of {names}")
+        if not number(owner, "window_mb", self.window_mb) > 0.0:
+            raise InputError(f"{owner}: window_mb = {self.window_mb} must be positive")
+        if self.rows is not None and not number(owner, "rows", self.rows) >= 0.0:
+            raise InputError(f"{owner}: rows = {self.rows} must not be negative; None to decide")
+        if not 1e-12 <= number(owner, "rtol", self.rtol) <= 1e-2:
             raise InputError(f"rtol = {self.rtol}: choose a tolerance from 1e-12 to 1e-2")

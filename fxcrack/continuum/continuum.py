@@ -22,14 +22,22 @@ import ufl
 from dolfinx import fem
 from petsc4py import PETSc
 
+from fxcrack.base import collective_garbage
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import whole
 from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.kinematics import Axisymmetric, Model
 from fxcrack.continuum.loads import Field
-from fxcrack.continuum.materials import Material
+from fxcrack.continuum.materials import Material, stiffness_of
+from fxcrack.continuum.shell_cells import ShellCells
 from fxcrack.continuum.temperature import ByTemperature, Temperature
-from fxcrack.continuum.temperature_field import TemperatureField, interpolated
+from fxcrack.continuum.temperature_field import (
+    TemperatureField,
+    interpolate_given,
+    interpolated,
+)
 from fxcrack.mesh import Mesh
 
 Ints = npt.NDArray[np.int32]
@@ -54,6 +62,7 @@ class Continuum:
         parts: Stiffness on the model's strains, all stresses per strain, and measure, per material.
         part_materials: The material of each part.
         part_cells: Owned cells of each part.
+        shell_cells: Cells of the parts that are continuum shells, by number of the part.
         temperature: The temperature on this mesh, ``None`` where there is none.
 
     Raises:
@@ -86,10 +95,12 @@ class Continuum:
             )
         self.mesh = mesh
         self.model = model
-        self.order = mesh.order if order is None else order
+        self.order = mesh.order if order is None else whole("Scene", "order", order)
         if self.order not in (1, 2):
             raise InputError(f"order = {self.order}: only displacements of order 1 and 2 exist")
         self.comm = mesh.comm
+        collective_garbage.collect(mesh.comm)
+        collective_garbage.watch(self, mesh.comm, mesh.domain.comm)
         self.gdim = mesh.gdim
         self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (self.gdim,)))
         n_owned = int(self.space.dofmap.index_map.size_local)
@@ -105,15 +116,9 @@ class Continuum:
         self.temperature: TemperatureField | None = None
         if temperature is not None:
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
-        listed = materials.values() if isinstance(materials, Mapping) else [materials]
-        for material in listed:
-            if isinstance(material, type) or not hasattr(material, "stiffness"):
-                raise InputError(
-                    f"materials: {material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
-                    "nu=0.3), or one per cell group, {'name': Isotropic(...)}"
-                )
         self.part_materials: list[Material] = []
         self.part_cells: list[Ints] = []
+        self.shell_cells: dict[int, ShellCells] = {}
         self.parts = self._assign(materials)
         self._form: Any = None
 
@@ -135,18 +140,56 @@ class Continuum:
     def _assign(self, materials: Material | Mapping[str, Material]) -> list[tuple[Any, Any, Any]]:
         """Stiffness, stress per strain and measure, one triple per material."""
         domain, meta = self.mesh.domain, {"quadrature_degree": self.degree}
-        if not isinstance(materials, Mapping):
+        index_map = domain.topology.index_map(self.mesh.tdim)
+        n_cells = int(index_map.size_local)
+        if isinstance(materials, Mapping):
+            groups = self._groups(materials)
+            names = list(materials)
+            self.part_materials = list(materials.values())
+        else:
+            groups = [np.arange(n_cells + index_map.num_ghosts, dtype=np.int32)]
+            names = ["all cells"]
             self.part_materials = [materials]
-            n = domain.topology.index_map(self.mesh.tdim).size_local
-            self.part_cells = [np.arange(n, dtype=np.int32)]
+        self.part_cells = [c[c < n_cells] for c in groups]
+        marks, tags = [], []
+        for i, (material, cells) in enumerate(zip(self.part_materials, groups, strict=True)):
+            found = np.full(len(cells), 3 * i, dtype=np.int32)
+            if isinstance(material, ContinuumShell):
+                self._check_shell(names[i])
+                shell = ShellCells(self.mesh, cells, material, names[i])
+                self.shell_cells[i] = shell
+                found += shell.stacking.axis.astype(np.int32)
+            marks.append(found)
+            counts = self.comm.allreduce(np.bincount(found - 3 * i, minlength=3))
+            tags.append({axis: 3 * i + axis for axis in range(3) if counts[axis]})
+        if isinstance(materials, Mapping) or self.shell_cells:
+            entities, values = np.concatenate(groups), np.concatenate(marks)
+            sort = np.argsort(entities)
+            marked = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], values[sort])
+            dx = ufl.Measure("dx", domain=domain, subdomain_data=marked, metadata=meta)
+        else:
             return [(*self._moduli(0), ufl.dx(domain, metadata=meta))]
-        n_cells = domain.topology.index_map(self.mesh.tdim).size_local
+        parts = []
+        for i, tag in enumerate(tags):
+            if i in self.shell_cells:
+                shell = self.shell_cells[i]
+                parts.append((shell.stiffness, shell.stiffness, shell.measure(dx, tag)))
+            else:
+                parts.append((*self._moduli(i), dx(3 * i)))
+        return parts
+
+    def _groups(self, materials: Mapping[str, Material]) -> list[Ints]:
+        """Cells of each material, owned and ghost, shapes (n_cells,); collective.
+
+        Raises:
+            InputError: A cell has no material or several.
+        """
+        n_cells = self.mesh.domain.topology.index_map(self.mesh.tdim).size_local
         count = np.zeros(n_cells, dtype=np.int32)
-        cells, values = [], []
-        for i, name in enumerate(materials):
+        cells = []
+        for name in materials:
             group = self.mesh.group(name, dim=self.mesh.tdim).entities
             cells.append(group)
-            values.append(np.full(len(group), i + 1, dtype=np.int32))
             count[group[group < n_cells]] += 1
         bad = None
         if np.any(count != 1):
@@ -158,23 +201,35 @@ class Continuum:
                 f"{', '.join(sorted(named - set(materials))) or 'none'})"
             )
         raise_on_all_ranks(self.comm, bad)
-        self.part_materials = list(materials.values())
-        self.part_cells = [c[c < n_cells] for c in cells]
-        entities, tags = np.concatenate(cells), np.concatenate(values)
-        sort = np.argsort(entities)
-        marks = dolfinx.mesh.meshtags(domain, self.mesh.tdim, entities[sort], tags[sort])
-        dx = ufl.Measure("dx", domain=domain, subdomain_data=marks, metadata=meta)
-        return [(*self._moduli(i), dx(i + 1)) for i in range(len(materials))]
+        return cells
+
+    def _check_shell(self, name: str) -> None:
+        """Refuse a continuum shell that this continuum cannot hold."""
+        if self.gdim != 3:
+            raise InputError(
+                f"ContinuumShell of '{name}': it needs a mesh of hexahedra, in 3-D, and "
+                f"mesh '{self.mesh.name}' is plane; give a solid material"
+            )
+        if self.order != 2:
+            raise InputError(
+                f"ContinuumShell of '{name}': its displacement is of second order (27 nodes); give "
+                "Scene(order=2), or mesh with second-order cells where the shell is curved"
+            )
+        if self.temperature is not None:
+            raise InputError(
+                f"ContinuumShell of '{name}': temperature is not known to continuum shells yet; "
+                "model the group with solid cells (laminate.layers), or leave Temperature out"
+            )
 
     def _moduli(self, i: int) -> tuple[Any, Any]:
         """Stiffness on the strains of the model, and all its stresses per unit strain."""
         material, model = self.part_materials[i], self.model
         if self.temperature is not None and isinstance(material, ByTemperature):
             return (
-                self.by_temperature(i, lambda m: model.reduce(m.stiffness())),
-                self.by_temperature(i, lambda m: model.recover(m.stiffness())),
+                self.by_temperature(i, lambda m: model.reduce(stiffness_of(m))),
+                self.by_temperature(i, lambda m: model.recover(stiffness_of(m))),
             )
-        domain, c = self.mesh.domain, material.stiffness()
+        domain, c = self.mesh.domain, stiffness_of(material)
         return (
             fem.Constant(domain, self.model.reduce(c)),
             fem.Constant(domain, self.model.recover(c)),
@@ -226,8 +281,18 @@ class Continuum:
         )
         return ufl.Measure("dx", domain=self.mesh.domain, subdomain_data=marks, metadata=meta)(1)
 
-    def field(self, value: Field) -> Any:
-        """A number as a UFL constant, a function of positions interpolated in each cell."""
+    def field(self, value: Field, title: str) -> Any:
+        """A number as a UFL constant, a function of positions interpolated in each cell.
+
+        Collective.
+
+        Args:
+            value: The number or function.
+            title: What it is the value of, for messages.
+
+        Raises:
+            InputError: The function fails or gives other than one number per position.
+        """
         if not callable(value):
             return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
         # points inside the cells: a step at a cell boundary stays a step
@@ -242,16 +307,7 @@ class Continuum:
             function.interpolate(value)
             return function
 
-        def at(x: Array) -> Array:
-            found = np.asarray(value(x), dtype=PETSc.ScalarType)
-            if found.shape not in ((), (x.shape[1],), (1, x.shape[1])):
-                raise InputError(
-                    f"a function of position of a load gives shape {found.shape} at {x.shape[1]} "
-                    "positions x of shape (3, n); return one number per position, shape (n,)"
-                )
-            return np.array(np.broadcast_to(found, (1, x.shape[1]))[0])
-
-        function.interpolate(at)
+        interpolate_given(self.comm, function, title, "value", value)
         return function
 
     def owned_nodes(self, where: str) -> Ints:

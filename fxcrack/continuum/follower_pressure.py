@@ -39,7 +39,7 @@ class FollowerPressure(Term):
         self._load = load
         domain = continuum.mesh.domain
         self._ds = continuum.surface(load.where)
-        self._value = continuum.field(load.value)
+        self._value = continuum.field(load.value, f"load '{load.title}'")
         self._factor = fem.Constant(domain, PETSc.ScalarType(0.0))
         self._last_factor = 0.0
         self._last = np.zeros_like(fem.Function(continuum.space).x.array)

@@ -19,10 +19,24 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import (
+    between,
+    flag,
+    keep,
+    keep_floats,
+    list_of,
+    not_negative,
+    number,
+    number_or_function,
+    positive,
+    shown,
+)
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.loads import Field
+from fxcrack.continuum.reduced_integration import whole_measure
+from fxcrack.continuum.temperature_field import interpolate_given
 from fxcrack.continuum.term import Term
 
 
@@ -55,32 +69,45 @@ class Inertia:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if self.density is not None and not (np.isfinite(self.density) and self.density > 0.0):
-            raise InputError(f"Inertia: density = {self.density} must be positive")
-        if not 0.0 <= self.rho_inf <= 1.0:
-            raise InputError(f"Inertia: rho_inf = {self.rho_inf} must lie between 0 and 1")
+        if self.density is not None:
+            positive("Inertia", density=self.density)
+        between("Inertia", "rho_inf", self.rho_inf, 0.0, 1.0)
+        for name in ("alpha_m", "alpha_f"):
+            if getattr(self, name) is not None:
+                between("Inertia", name, getattr(self, name), -1.0, 0.5)
+        keep_floats(self, "density", "rho_inf", "alpha_m", "alpha_f")
+        keep(self, lumped=flag("Inertia", "lumped", self.lumped))
         if (self.alpha_m is None) != (self.alpha_f is None):
             raise InputError("Inertia: give alpha_m and alpha_f together, or rho_inf alone")
-        if self.velocity is not None and not isinstance(self.velocity, tuple | list):
+        velocity = list_of(self.velocity)
+        if self.velocity is not None and velocity is None:
             raise InputError(
-                f"Inertia: velocity = {self.velocity!r} must have one entry per component, each a "
-                "number or a function of position, e.g. (0.0, 1.0)"
+                f"Inertia: velocity = {shown(self.velocity)} must have one entry per component, "
+                "each a number or a function of position, e.g. (0.0, 1.0)"
             )
+        if velocity is not None:
+            for i, component in enumerate(velocity):
+                number_or_function("Inertia", f"velocity[{i}]", component)
+            keep(self, velocity=tuple(velocity))
         m, f, _, _ = self.parameters
         if not m <= f <= 0.5:
             raise InputError(
                 f"Inertia: alpha_m = {m}, alpha_f = {f} is not unconditionally stable; "
                 "alpha_m <= alpha_f <= 1/2 is"
             )
-        if len(self.rayleigh) != 2 or not all(np.isfinite(r) and r >= 0.0 for r in self.rayleigh):
+        rayleigh = list_of(self.rayleigh)
+        if rayleigh is None or len(rayleigh) != 2:
             raise InputError(
-                f"Inertia: rayleigh = {self.rayleigh} must be two numbers that are not negative"
+                f"Inertia: rayleigh = {shown(self.rayleigh)} must be two numbers that are not "
+                "negative"
             )
+        not_negative("Inertia", **{f"rayleigh[{i}]": r for i, r in enumerate(rayleigh)})
+        keep(self, rayleigh=tuple(float(r) for r in rayleigh))
 
     @classmethod
     def hht(cls, alpha: float = -0.05, **others: object) -> Inertia:
         """Hilber, Hughes and Taylor's method, -1/3 <= alpha <= 0."""
-        if not -1.0 / 3.0 <= alpha <= 0.0:
+        if not -1.0 / 3.0 <= number("Inertia.hht", "alpha", alpha) <= 0.0:
             raise InputError(f"Inertia.hht: alpha = {alpha} must lie between -1/3 and 0")
         return cls(alpha_m=0.0, alpha_f=-alpha, **others)  # type: ignore[arg-type]
 
@@ -163,11 +190,13 @@ class InertiaForces(Term):
         gdim = self._continuum.gdim
         if len(velocity) != gdim:
             raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
-        self.velocity.interpolate(
-            lambda x: np.stack(
-                [np.broadcast_to(v(x) if callable(v) else float(v), x.shape[1]) for v in velocity]
-            )
-        )
+        comm = self._continuum.comm
+        for i, v in enumerate(velocity):
+            component = self.velocity.sub(i)
+            if callable(v):
+                interpolate_given(comm, component, "Inertia", f"velocity[{i}]", v)
+            else:
+                component.interpolate(lambda x, v=v: np.full(x.shape[1], float(v)))
 
     def _slowing(self) -> Array:
         """First acceleration, M a = -C v, of a body without forces; collective."""
@@ -193,6 +222,7 @@ class InertiaForces(Term):
         c = self._continuum
         total = 0
         for density, (_, _, dx) in zip(self._densities, c.parts, strict=True):
+            dx = whole_measure(dx)
             if self._effect.lumped:
                 dx = dx.reconstruct(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
             total += density * ufl.inner(a, v) * c.weight * dx

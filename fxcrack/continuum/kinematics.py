@@ -15,6 +15,7 @@ import numpy as np
 import ufl
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import keep, number
 from fxcrack.base.errors import InputError
 
 
@@ -26,11 +27,11 @@ class _Plane:
     stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "xy")
 
     def __post_init__(self) -> None:
-        number = isinstance(self.thickness, int | float | np.number)
-        if not (number and 0.0 < self.thickness < np.inf):
-            raise InputError(
-                f"{type(self).__name__}: thickness = {self.thickness!r} is not positive and finite"
-            )
+        name = type(self).__name__
+        thickness = number(name, "thickness", self.thickness)
+        if not 0.0 < thickness < np.inf:
+            raise InputError(f"{name}: thickness = {thickness} is not positive and finite")
+        keep(self, thickness=thickness)
 
     def strain(self, u: Any, x: Any) -> Any:
         """Voigt strain (xx, yy, xy) of a UFL displacement."""

@@ -43,7 +43,8 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
     elif isinstance(load, Pressure):
         ds = continuum.surface(load.where)
         normal = ufl.FacetNormal(continuum.mesh.domain)
-        form = -ufl.inner(continuum.field(load.value) * normal, v) * continuum.weight * ds
+        value = continuum.field(load.value, f"load '{load.title}'")
+        form = -ufl.inner(value * normal, v) * continuum.weight * ds
     elif isinstance(load, BodyForce):
         value = _vector(continuum, load.value, load.title)
         form = ufl.inner(value, v) * continuum.weight * continuum.volume(load.where)
@@ -62,7 +63,7 @@ def _check_components(continuum: Continuum, value: tuple[Field, ...], title: str
 
 def _vector(continuum: Continuum, value: tuple[Field, ...], title: str) -> Any:
     _check_components(continuum, value, title)
-    return ufl.as_vector([continuum.field(v) for v in value])
+    return ufl.as_vector([continuum.field(v, f"load '{title}'") for v in value])
 
 
 def _point_force(

@@ -7,10 +7,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import (
+    as_float,
+    flag,
+    is_function,
+    keep,
+    list_of,
+    number_or_function,
+    numbers,
+    table,
+    text,
+)
 from fxcrack.base.errors import InputError
 
 Field = float | Callable[[Array], Array]
@@ -31,15 +43,14 @@ class Amplitude:
 
     def __post_init__(self) -> None:
         """Check the table."""
-        if len(self.times) != len(self.values) or not self.times:
+        n, m = (len(list_of(v) or ()) for v in (self.times, self.values))
+        if n != m or not n:
             raise InputError(
-                f"Amplitude: {len(self.times)} times but {len(self.values)} values; "
-                "give as many of one as of the other, at least one"
+                f"Amplitude: {n} times but {m} values; give as many of one as of the other, at "
+                "least one"
             )
-        if not np.all(np.isfinite([*self.times, *self.values])):
-            raise InputError("Amplitude: times and values must be finite numbers")
-        if np.any(np.diff(self.times) <= 0.0):
-            raise InputError(f"Amplitude: times {self.times} must increase")
+        times, values = table("Amplitude", ("times", "values"), self.times, self.values)
+        keep(self, times=times, values=values)
 
     def __call__(self, time: float) -> float:
         """Factor at a time."""
@@ -93,10 +104,15 @@ class Displacement:
 
     def __post_init__(self) -> None:
         """Refuse a support that supports nothing."""
+        _check_names("Displacement", self.where, self.name)
         if self.x is None and self.y is None and self.z is None:
             raise InputError(
                 f"Displacement('{self.where}') prescribes nothing; give x, y or z (0.0 holds it)"
             )
+        owner = f"Displacement('{self.where}')"
+        for axis in "xyz":
+            if getattr(self, axis) is not None:
+                number_or_function(owner, axis, getattr(self, axis))
 
     @property
     def title(self) -> str:
@@ -119,6 +135,12 @@ class Traction:
     value: tuple[Field, ...]
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check names and components."""
+        _check_names(type(self).__name__, self.where, self.name)
+        owner = f"load '{self.title}'"
+        keep(self, value=_components(owner, self.value))
 
     @property
     def title(self) -> str:
@@ -145,6 +167,13 @@ class Pressure:
     name: str | None = None
     follows: bool = False
 
+    def __post_init__(self) -> None:
+        """Check names and value."""
+        _check_names(type(self).__name__, self.where, self.name)
+        owner = f"load '{self.title}'"
+        number_or_function(owner, "value", self.value)
+        keep(self, follows=flag(owner, "follows", self.follows))
+
     @property
     def title(self) -> str:
         """Name in the history."""
@@ -166,6 +195,12 @@ class BodyForce:
     where: str | None = None
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check names and components."""
+        text("BodyForce", "where", self.where, optional=True)
+        text("BodyForce", "name", self.name, optional=True)
+        keep(self, value=_components(f"load '{self.title}'", self.value))
 
     @property
     def title(self) -> str:
@@ -189,10 +224,43 @@ class PointForce:
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
 
+    def __post_init__(self) -> None:
+        """Check names and components."""
+        _check_names(type(self).__name__, self.where, self.name)
+        owner = f"load '{self.title}'"
+        keep(self, value=_components(owner, self.value, functions=False))
+
     @property
     def title(self) -> str:
         """Name in the history."""
         return self.name or self.where
+
+
+def _check_names(owner: str, where: object, name: object) -> None:
+    """Check the name of a group and the name in the history."""
+    text(owner, "where", where)
+    text(owner, "name", name, optional=True)
+
+
+def _components(owner: str, value: Any, *, functions: bool = True) -> Any:
+    """Components of a load as a tuple, if each is a number (or a function of position).
+
+    How many there must be is known with the mesh only; what is no list is refused there as well.
+    """
+    entries = list_of(value)
+    if entries is None:
+        return value
+    for i, entry in enumerate(entries):
+        found = as_float(entry)
+        if found is not None and not np.isfinite(found):
+            raise InputError(f"{owner} is not a finite number: value[{i}] = {entry}; mend it")
+        if functions or not is_function(entry):
+            number_or_function(owner, f"value[{i}]", entry)
+        else:
+            raise InputError(
+                f"{owner}: value[{i}] is a function, but a total force at one place is a number"
+            )
+    return tuple(entries)
 
 
 Load = Traction | Pressure | BodyForce | PointForce
@@ -214,11 +282,14 @@ class Monitor:
 
     def __post_init__(self) -> None:
         """Refuse a direction that is none."""
-        if not (np.all(np.isfinite(self.direction)) and np.any(self.direction)):
+        _check_names("Monitor", self.where, self.name)
+        owner = f"Monitor('{self.where}')"
+        direction = numbers(owner, "direction", self.direction, words="components of a direction")
+        if not any(direction):
             raise InputError(
-                f"Monitor('{self.where}'): direction = {self.direction} must hold finite numbers, "
-                "not all of them zero"
+                f"{owner}: direction = {direction} must hold finite numbers, not all of them zero"
             )
+        keep(self, direction=direction)
 
     @property
     def title(self) -> str:

@@ -12,6 +12,18 @@ from typing import ClassVar, Protocol
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import (
+    as_float,
+    between,
+    finite,
+    keep,
+    keep_floats,
+    list_of,
+    not_negative,
+    numbers,
+    positive,
+    shown,
+)
 from fxcrack.base.errors import InputError
 
 
@@ -41,12 +53,13 @@ class Isotropic:
     def __post_init__(self) -> None:
         """Check the constants."""
         name = type(self).__name__
-        _check_numbers(name, E=self.E, nu=self.nu)
-        if not (np.isfinite(self.E) and self.E > 0.0):
-            raise InputError(f"{name}: E = {self.E} must be positive")
-        if not -1.0 < self.nu < 0.5:
-            raise InputError(f"{name}: nu = {self.nu} must lie between -1 and 0.5 (exclusive)")
-        _check_common(name, self.expansion, self.density)
+        positive(name, E=self.E)
+        between(name, "nu", self.nu, -1.0, 0.5, ends=False)
+        finite(name, expansion=self.expansion)
+        _check_density(name, self.density)
+        keep_floats(self, "E", "nu", "expansion", "density")
+        with np.errstate(over="ignore"):
+            check_stiffness(f"{name}(E={self.E}, nu={self.nu})", self.stiffness())
 
     def stiffness(self) -> Array:
         """Stiffness, shape (6, 6), force/length^2."""
@@ -91,31 +104,27 @@ class Orthotropic:
         """Check the constants and the frame."""
         parts = {"E": "E1, E2, E3", "nu": "nu12, nu13, nu23", "G": "G12, G13, G23"}
         for name, needed in parts.items():
-            value = getattr(self, name)
-            if np.shape(value) != (3,) or np.asarray(value).dtype.kind not in "fiu":
+            value = list_of(getattr(self, name))
+            if value is None or len(value) != 3 or any(as_float(v) is None for v in value):
                 raise InputError(
-                    f"Orthotropic: {name} = {value!r} must be three numbers, ({needed}); a ply "
-                    "that is alike across its fibres has E3 = E2, nu13 = nu12, G13 = G12"
+                    f"Orthotropic: {name} = {shown(getattr(self, name))} must be three numbers, "
+                    f"({needed}); a ply that is alike across its fibres has E3 = E2, nu13 = nu12, "
+                    "G13 = G12"
                 )
-        if min(*self.E, *self.G) <= 0.0 or not np.all(np.isfinite([*self.E, *self.G, *self.nu])):
-            raise InputError(f"Orthotropic: E = {self.E} and G = {self.G} must be positive numbers")
+            entries = dict(zip(needed.split(", "), value, strict=True))
+            finite("Orthotropic", **entries) if name == "nu" else positive("Orthotropic", **entries)
+            keep(self, **{name: numbers("Orthotropic", name, value, 3)})
         if np.linalg.eigvalsh(self._compliance()).min() <= 0.0:
             raise InputError(
                 f"Orthotropic: nu = {self.nu} with E = {self.E} is no stable material "
                 "(compliance not positive definite); check the order nu12, nu13, nu23"
             )
-        axis1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
-        if not np.all(np.isfinite(self.frame)):
-            raise InputError(f"Orthotropic: frame = {self.frame} must hold finite numbers")
-        if np.linalg.norm(np.cross(axis1, in_plane)) < 1e-8 * np.linalg.norm(axis1) * max(
-            float(np.linalg.norm(in_plane)), 1e-300
-        ):
-            raise InputError(f"Orthotropic: the two vectors of frame = {self.frame} are parallel")
-        if np.shape(self.expansion) != (3,):
-            raise InputError(
-                f"Orthotropic: expansion = {self.expansion} must be three numbers, one per axis"
-            )
-        _check_common("Orthotropic", self.expansion, self.density)
+        keep(self, frame=_checked_frame("Orthotropic", self.frame))
+        expansion = numbers("Orthotropic", "expansion", self.expansion, 3, words="one per axis")
+        keep(self, expansion=expansion)
+        _check_density("Orthotropic", self.density)
+        keep_floats(self, "density")
+        check_stiffness(f"Orthotropic(E={self.E}, nu={self.nu}, G={self.G})", self.stiffness())
 
     def _compliance(self) -> Array:
         e1, e2, e3 = self.E
@@ -142,24 +151,113 @@ class Orthotropic:
 
     def _to_local(self) -> Array:
         """Takes a strain from global axes to the frame, shape (6, 6)."""
-        e1, in_plane = (np.asarray(v, dtype=float) for v in self.frame)
-        e1 = e1 / np.linalg.norm(e1)
-        e3 = np.cross(e1, in_plane)
-        e3 /= np.linalg.norm(e3)
-        return strain_rotation(np.vstack([e1, np.cross(e3, e1), e3]))
+        return strain_rotation(frame_axes("Orthotropic", self.frame))
 
 
-def _check_numbers(name: str, **values: object) -> None:
-    for key, value in values.items():
-        if isinstance(value, str) or not np.isscalar(value):
-            raise InputError(f"{name}: {key} = {value!r} is not a number; give one")
+def frame_axes(name: str, frame: object) -> Array:
+    """Unit vectors of material axes from two directions.
+
+    Args:
+        name: Whose frame it is, for messages.
+        frame: Global directions of axis 1 and of a vector in the plane of axes 1 and 2.
+
+    Returns:
+        Rows are axes 1, 2, 3 in global components, shape (3, 3).
+
+    Raises:
+        InputError: They are not two vectors of three numbers, or they are parallel.
+    """
+    e1, in_plane = (_unit(np.asarray(v)) for v in _checked_frame(name, frame))
+    e3 = np.cross(e1, in_plane)
+    e3 /= np.linalg.norm(e3)
+    return np.vstack([e1, np.cross(e3, e1), e3])
 
 
-def _check_common(name: str, expansion: float | tuple[float, ...], density: float | None) -> None:
-    if not np.all(np.isfinite(expansion)):
-        raise InputError(f"{name}: expansion = {expansion} must be finite")
-    if density is not None and not (np.isfinite(density) and density > 0.0):
-        raise InputError(f"{name}: density = {density} must be positive; leave it out for none")
+def _check_density(name: str, density: object) -> None:
+    if density is not None:
+        positive(name, density=density)
+
+
+def _checked_frame(owner: str, frame: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Two direction vectors as tuples, neither zero nor parallel."""
+    rows = list_of(frame)
+    if rows is None or len(rows) != 2 or any(len(list_of(row) or ()) != 3 for row in rows):
+        raise InputError(
+            f"{owner}: frame = {shown(frame)} must be two direction vectors of three components "
+            "each, axis 1 and one in the plane of axes 1 and 2"
+        )
+    try:
+        first, second = (numbers("vector", f"{i}", row, 3) for i, row in enumerate(rows))
+    except InputError as error:
+        raise InputError(f"{owner}: frame = {frame} must hold finite numbers ({error})") from error
+    for i, row in enumerate((first, second)):
+        if not any(row):
+            raise InputError(f"{owner}: frame[{i}] = {row} is zero; give a direction")
+    if np.linalg.norm(np.cross(_unit(np.array(first)), _unit(np.array(second)))) < 1e-8:
+        raise InputError(f"{owner}: the two vectors of frame = {frame} are parallel")
+    return first, second
+
+
+def _unit(vector: Array) -> Array:
+    """A direction of length 1, without overflow on the way."""
+    scaled = vector / np.abs(vector).max()
+    return np.asarray(scaled / np.linalg.norm(scaled))
+
+
+def stiffness_of(material: Material) -> Array:
+    """Stiffness of a material, a user's own perhaps, shape (6, 6), force/length^2.
+
+    Raises:
+        InputError: It fails, or gives what belongs to no stable material.
+    """
+    try:
+        found = material.stiffness()
+    except InputError:
+        raise
+    except Exception as error:  # whatever the user's method may raise
+        raise InputError(
+            f"{type(material).__name__}: stiffness() fails: {type(error).__name__}: {error}; it "
+            "must return the stiffness in global axes, shape (6, 6)"
+        ) from error
+    return check_stiffness(type(material).__name__, found)
+
+
+def check_stiffness(owner: str, stiffness: object) -> Array:
+    """Return a stiffness as an array, if it belongs to a stable material.
+
+    Args:
+        owner: The material, for the message.
+        stiffness: What its method ``stiffness`` gave, shape (6, 6), force/length^2.
+
+    Raises:
+        InputError: It has another shape, is not finite, not symmetric or not positive definite.
+    """
+    try:
+        c = np.asarray(stiffness)
+        c = c.astype(np.float64) if c.dtype.kind in "fiu" else np.full(c.shape, np.nan)
+    except (TypeError, ValueError):
+        c = np.zeros(0)
+    if c.shape != (6, 6):
+        raise InputError(
+            f"{owner}: the stiffness has shape {c.shape}; it must be (6, 6), in the order 11, 22, "
+            "33, 23, 13, 12"
+        )
+    if not np.all(np.isfinite(c)):
+        raise InputError(
+            f"{owner}: the stiffness holds entries that are no finite numbers; its moduli are too "
+            "large or not given as numbers"
+        )
+    size = float(np.abs(c).max())
+    if not size > 0.0 or float(np.abs(c - c.T).max()) > 1e-8 * size:
+        raise InputError(f"{owner}: the stiffness is zero or not symmetric; no material has such")
+    scaled = 0.5 * (c / size + c.T / size)
+    if np.linalg.eigvalsh(scaled).min() <= 0.0:
+        raise InputError(
+            f"{owner}: the stiffness is not positive definite (smallest eigenvalue "
+            f"{size * np.linalg.eigvalsh(scaled).min():.3g}); some strain would set energy free: "
+            "check the moduli and Poisson's ratios"
+        )
+    return np.asarray(c)
 
 
 def strain_rotation(axes: Array) -> Array:
@@ -225,21 +323,22 @@ class Plastic(Isotropic):
     def __post_init__(self) -> None:
         """Check the constants and the table."""
         super().__post_init__()
-        if isinstance(self.hardening, int | float):
-            if self.yield_stress is None or not (
-                np.isfinite(self.yield_stress) and self.yield_stress > 0.0
-            ):
-                raise InputError(f"Plastic: yield_stress = {self.yield_stress} must be positive")
-            if not (np.isfinite(self.hardening) and self.hardening >= 0.0):
-                raise InputError(
-                    f"Plastic: hardening = {self.hardening} must not be negative (no softening)"
-                )
+        rows = list_of(self.hardening)
+        if rows is None:
+            if self.yield_stress is None:
+                raise InputError("Plastic: yield_stress = None must be positive")
+            positive("Plastic", yield_stress=self.yield_stress)
+            not_negative("Plastic (no softening)", hardening=self.hardening)
+            keep_floats(self, "yield_stress", "hardening")
             return
-        table = np.asarray(self.hardening, dtype=np.float64)
-        if table.ndim != 2 or table.shape[1] != 2 or not np.all(np.isfinite(table)):
+        pairs = [list_of(row) for row in rows]
+        if not rows or any(pair is None or len(pair) != 2 for pair in pairs):
             raise InputError(
                 "Plastic: hardening must be a number or pairs (equivalent plastic strain, stress)"
             )
+        kept = tuple(numbers("Plastic", f"hardening[{i}]", pair, 2) for i, pair in enumerate(pairs))
+        table = np.array(kept)
+        keep(self, hardening=kept)
         if table[0, 0] != 0.0 or table[0, 1] <= 0.0 or np.any(np.diff(table[:, 0]) <= 0.0):
             raise InputError(
                 f"Plastic: plastic strains {table[:, 0]} must start at 0 and increase, and the "
@@ -247,7 +346,11 @@ class Plastic(Isotropic):
             )
         if np.any(np.diff(table[:, 1]) < 0.0):
             raise InputError(f"Plastic: yield stresses {table[:, 1]} must not fall (no softening)")
-        if self.yield_stress is not None and self.yield_stress != table[0, 1]:
+        if self.yield_stress is None:
+            return
+        positive("Plastic", yield_stress=self.yield_stress)
+        keep_floats(self, "yield_stress")
+        if self.yield_stress != table[0, 1]:
             raise InputError(
                 f"Plastic: yield_stress = {self.yield_stress} contradicts the first entry "
                 f"{table[0, 1]} of the table; leave it out"

@@ -15,6 +15,15 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import (
+    finite,
+    keep,
+    keep_floats,
+    list_of,
+    number_or_function,
+    numbers,
+    shown,
+)
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.loads import Amplitude, AmplitudeLike, Ramp
 from fxcrack.continuum.materials import Material
@@ -42,26 +51,34 @@ class Temperature:
 
     def __post_init__(self) -> None:
         """Check times and numbers."""
-        if not np.isfinite(self.reference):
-            raise InputError(f"Temperature: reference = {self.reference} must be finite")
+        finite("Temperature", reference=self.reference)
+        keep_floats(self, "reference")
+        if self.amplitude is not None and (
+            isinstance(self.amplitude, type) or not hasattr(self.amplitude, "breaks")
+        ):
+            raise InputError(
+                f"Temperature: amplitude is {type(self.amplitude).__name__}; give "
+                "Amplitude(times, values), or None for the time itself"
+            )
         series = self._series
         if series is not None:
             if self.amplitude is not None:
                 raise InputError(
                     "Temperature: fields at given times take no amplitude; give one or the other"
                 )
-            if not len(series) or any(len(entry) != 2 for entry in series):
+            if not len(series) or any(len(list_of(entry) or ()) != 2 for entry in series):
                 raise InputError("Temperature: a field per time is a list of (time, field)")
-            times = [float(t) for t, _ in series]
-            if not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
-                raise InputError(f"Temperature: times {times} must be finite and increase")
+            times = numbers("Temperature", "times", [t for t, _ in series])
+            if np.any(np.diff(times) <= 0.0):
+                raise InputError(f"Temperature: times {list(times)} must be finite and increase")
+            keep(self, value=tuple((t, f) for t, (_, f) in zip(times, series, strict=True)))
         for field, _ in self.patterns():
-            if isinstance(field, int | float) and not np.isfinite(field):
-                raise InputError(f"Temperature: value = {field} must be finite")
+            number_or_function("Temperature", "value", field)
 
     @property
     def _series(self) -> Sequence[tuple[float, Spatial]] | None:
-        return self.value if isinstance(self.value, Sequence) else None
+        found = list_of(self.value)
+        return None if found is None else found
 
     def patterns(self) -> list[tuple[Spatial, AmplitudeLike]]:
         """Fields T_k and factors a_k with T - T_ref = sum_k a_k(t) (T_k - T_ref)."""
@@ -104,11 +121,21 @@ class ByTemperature:
 
     def __post_init__(self) -> None:
         """Check the table."""
-        if not self.table or not np.all(np.isfinite(list(self.table))):
+        if not isinstance(self.table, Mapping) or not self.table:
             raise InputError(
-                "ByTemperature: give a material for each of one or more finite temperatures"
+                "ByTemperature: give a material for each of one or more finite temperatures, "
+                "{20.0: Isotropic(...), -50.0: Isotropic(...)}"
             )
-        for material in self.table.values():
+        for temperature, material in self.table.items():
+            finite(
+                "ByTemperature: give a material for each of one or more finite temperatures",
+                **{"a temperature": temperature},
+            )
+            if isinstance(material, type) or not hasattr(material, "stiffness"):
+                raise InputError(
+                    f"ByTemperature: {shown(material)} is not a material; give one, e.g. "
+                    "Isotropic(E=70e3, nu=0.3)"
+                )
             if hasattr(material, "form"):
                 raise InputError(
                     f"ByTemperature: {type(material).__name__} cannot be tabulated against "

@@ -18,9 +18,12 @@ import dolfinx.mesh
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.errors import InputError
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.temperature import ByTemperature, Spatial, Temperature
@@ -93,6 +96,53 @@ class TemperatureField:
         return np.array(out)
 
 
+def interpolate_given(
+    comm: MPI.Intracomm,
+    out: fem.Function,
+    owner: str,
+    name: str,
+    given: Callable[[Array], Array],
+    n: int = 1,
+    *,
+    less: float = 0.0,
+) -> None:
+    """Interpolate a user's function of position; collective.
+
+    Args:
+        comm: Communicator of the mesh.
+        out: Where to; all of its components get the same.
+        owner: What the function was given to, for messages.
+        name: The argument it was given as.
+        given: Positions of shape (3, n_points) to numbers of shape (n_points,).
+        n: Number of components of ``out``.
+        less: What is taken off the numbers.
+
+    Raises:
+        InputError: It fails, or gives other than one finite number per position.
+    """
+    problem: str | None = None
+
+    def values(x: Array) -> Array:
+        nonlocal problem
+        numbers = np.zeros(x.shape[1])
+        try:
+            numbers = numbers_at(owner, name, given, x.T)
+        except InputError as error:  # on this rank, perhaps: said by all ranks below
+            problem = str(error)
+        bad = np.flatnonzero(~np.isfinite(numbers))
+        if len(bad):
+            problem = (
+                f"{owner} is not a finite number everywhere: {name} gives {numbers[bad[0]]} at "
+                f"{format_point(x[:, bad[0]])}; mend its value"
+            )
+            numbers = np.where(np.isfinite(numbers), numbers, 0.0)
+        numbers = numbers - less
+        return np.asarray(numbers if n == 1 else np.tile(numbers, (n, 1)))
+
+    out.interpolate(values)
+    raise_on_all_ranks(comm, problem)
+
+
 def _interpolate(out: fem.Function, field: Spatial, reference: float) -> None:
     """Set a function to (field - reference), all components alike."""
     space = out.function_space
@@ -107,12 +157,8 @@ def _interpolate(out: fem.Function, field: Spatial, reference: float) -> None:
         points = compat.interpolation_points(space)
         out.interpolate(fem.Expression(value if n == 1 else ufl.as_vector([value] * n), points))
     elif callable(field):
-
-        def values(x: Array) -> Array:
-            given = np.broadcast_to(field(x), x.shape[1]) - reference
-            return np.asarray(given if n == 1 else np.tile(given, (n, 1)))
-
-        out.interpolate(values)
+        comm = compat.plain_comm(space.mesh.comm)
+        interpolate_given(comm, out, "Temperature", "value", field, n, less=reference)
     else:
         rise = float(field) - reference
         out.interpolate(lambda x: np.full(x.shape[1] if n == 1 else (n, x.shape[1]), rise))

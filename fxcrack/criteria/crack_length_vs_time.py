@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
-from fxcrack.base.checks import not_negative, table
+from fxcrack.base.checks import flag, keep, not_negative, shown, table
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.evaluator import Evaluator
@@ -60,8 +60,9 @@ class CrackLengthVsTime(Criterion):
         """Check the curve."""
         owner = "CrackLengthVsTime"
         not_negative(owner, tolerance=self.tolerance)
+        keep(self, moving=flag(owner, "moving", self.moving))
         if not isinstance(self.reference, str) or not self.reference:
-            raise InputError(f"{owner}: reference = {self.reference!r} must name a node set")
+            raise InputError(f"{owner}: reference = {shown(self.reference)} must name a node set")
         times, lengths = table(owner, ("times", "lengths"), self.times, self.lengths)
         drops = np.flatnonzero(np.diff(lengths) < 0.0)
         if drops.size:

@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.checks import not_negative, positive, table
+from fxcrack.base.checks import flag, keep, list_of, not_negative, positive, table
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.at_distance import Stencil, _AtDistance, _on_face
 from fxcrack.criteria.criterion import Criterion
@@ -56,17 +56,19 @@ class CrackOpening(Criterion):
         owner = "CrackOpening"
         positive(owner, distance=self.distance)
         not_negative(owner, tolerance=self.tolerance)
+        keep(self, symmetry=flag(owner, "symmetry", self.symmetry))
         if isinstance(self.critical, Tabulated):
             return
-        if not isinstance(self.critical, tuple):
+        parts = list_of(self.critical)
+        if parts is None:
             positive(owner, critical=self.critical)
             return
-        if len(self.critical) != 2:
+        if len(parts) != 2:
             raise InputError(
-                f"{owner}: critical has {len(self.critical)} parts; give one number, or a table as "
+                f"{owner}: critical has {len(parts)} parts; give one number, or a table as "
                 "(crack lengths, critical openings)"
             )
-        lengths, values = table(owner, ("crack lengths", "critical openings"), *self.critical)
+        lengths, values = table(owner, ("crack lengths", "critical openings"), *parts)
         for i, value in enumerate(values):
             positive(owner, **{f"critical openings[{i}]": value})
         object.__setattr__(self, "critical", (lengths, values))

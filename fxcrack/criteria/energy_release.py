@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.checks import not_negative, one_of
+from fxcrack.base.checks import keep_floats, not_negative, one_of
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.crack_closure import (
     NORMALISATIONS,
@@ -40,7 +40,7 @@ class RateCriterion(Criterion):
 
     Attributes:
         GIc: Mode I toughness [force/length]: a number, one value per slave node, a function of
-            position (n, gdim) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
+            position (3, n) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
         GIIc: Mode II toughness, likewise; GIc when not given.
         GIIIc: Mode III toughness, likewise; GIIc when not given.
         mix: Mode-mix law, or a function f(G_I, G_II, G_III[, G_Ic, G_IIc, G_IIIc]) as one, see
@@ -67,6 +67,7 @@ class RateCriterion(Criterion):
     def __post_init__(self) -> None:
         """Check everything that does not need the interface."""
         not_negative(self._owner, tolerance=self.tolerance)
+        keep_floats(self, "tolerance")
         one_of(self._owner, "method", self.method, ("vcct", "closure"))
         one_of(self._owner, "normalisation", self.normalisation, NORMALISATIONS)
         if self.mix is not None:
@@ -115,8 +116,9 @@ class RateCriterion(Criterion):
         return 1.0, 1.0 + self.tolerance
 
     def _properties(self) -> dict[str, Property]:
-        given = {"GIc": self.GIc, "GIIc": self.GIIc, "GIIIc": self.GIIIc}
-        return {name: value for name, value in given.items() if value is not None}
+        given = {"GIIc": self.GIIc, "GIIIc": self.GIIIc}
+        others = {name: value for name, value in given.items() if value is not None}
+        return {"GIc": self.GIc, **others}
 
     def check_slaves(self, n_slave: int) -> None:
         """Check values given per slave node against the interface, before the analysis.

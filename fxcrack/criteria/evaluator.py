@@ -170,6 +170,8 @@ def first_crossing(
         if np.abs(b - scale * a).max() <= _ROUND_OFF * np.abs(b).max():
             # proportional: f grows with a power of the load
             rise = known.f.max() ** (-1.0 / degree) - 1.0
+            if rise >= 0.0 and not upward:
+                return 0.0  # below 1 already
             x = rise / (scale - 1.0) if scale != 1.0 else np.inf
             return float(x) if 0.0 <= x <= 1.0 else None
 

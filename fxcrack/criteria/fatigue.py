@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools
-from fxcrack.base.checks import not_negative, number, positive
+from fxcrack.base.checks import finite, flag, keep, keep_floats, not_negative, positive, shown
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.mixed_mode import total
@@ -61,8 +61,8 @@ class Paris:
         """Check the constants."""
         not_negative("Paris", c1=self.c1, r1=self.r1)
         positive("Paris", c3=self.c3, c4=self.c4, r2=self.r2)
-        if not np.isfinite(number("Paris", "c2", self.c2)):
-            raise InputError(f"Paris: c2 = {self.c2} must be finite")
+        finite("Paris", c2=self.c2)
+        keep_floats(self, "c1", "c2", "c3", "c4", "r1", "r2")
         if self.r1 >= self.r2:
             raise InputError(
                 f"Paris: threshold r1 = {self.r1} must be below the upper limit r2 = {self.r2}"
@@ -116,7 +116,10 @@ class Fatigue(RateCriterion):
         """Check everything that does not need the interface."""
         super().__post_init__()
         if not isinstance(self.paris, Paris):
-            raise InputError(f"Fatigue: paris = {self.paris!r} must be a Paris(c1, c2, c3, c4)")
+            raise InputError(
+                f"Fatigue: paris = {shown(self.paris)} must be a Paris(c1, c2, c3, c4)"
+            )
+        keep(self, credit=flag("Fatigue", "credit", self.credit))
 
     def cycle(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> tuple[Array, Array, Array]:
         """What the laws need from one stabilised cycle.

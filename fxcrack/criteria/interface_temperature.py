@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import format_point
+from fxcrack.base.checks import format_point, number
 from fxcrack.base.errors import InputError
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.criteria.probe import FrontProbe
@@ -86,13 +87,10 @@ def given_temperature(pair: Pair, gdim: int, temperature: Given) -> InterfaceTem
         return None
     x = pair.surface.x[:, :gdim]
     where = f"interface '{pair.title}'"
-    given = np.asarray(temperature(x) if callable(temperature) else temperature, dtype=float)
-    if given.shape not in ((), (len(x),)):
-        raise InputError(
-            f"{where}: temperature gives shape {given.shape} for positions of shape {x.shape}; one "
-            "number per slave node is needed (the first coordinate is x[:, 0])"
-        )
-    values = np.broadcast_to(given, (len(x),))
+    if callable(temperature):
+        values = numbers_at(where, "temperature", temperature, x)
+    else:
+        values = np.full(len(x), number(where, "temperature", temperature))
     if not np.isfinite(values).all():
         i = int(np.argmin(np.isfinite(values)))
         raise InputError(

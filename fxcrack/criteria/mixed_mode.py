@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import missing_members, positive
+from fxcrack.base.checks import missing_members, positive, shown
 from fxcrack.base.errors import InputError
 
 
@@ -250,7 +250,16 @@ class FunctionLaw(MixedMode):
         # a mode mix is not defined where nothing is released: the function is not called there
         given = np.where(some[..., None], g, tough).reshape(-1, 3)
         arguments = (*given.T, *tough.reshape(-1, 3).T)[: self._n]
-        f = np.asarray(self.function(*arguments), dtype=np.float64)
+        try:
+            f = np.asarray(self.function(*arguments))
+        except Exception as error:  # whatever the user's function may raise
+            raise InputError(
+                f"mix: the function {self._name} fails: {type(error).__name__}: {error}; it gets "
+                f"{self._n} arrays of shape {given.shape[:1]} and must return f of that shape"
+            ) from error
+        if f.dtype.kind not in "fiub":
+            raise InputError(f"mix: {self._name} returned values of type {f.dtype}, not numbers")
+        f = f.astype(np.float64)
         if f.shape != given.shape[:1]:
             raise InputError(
                 f"mix: {self._name} returned shape {f.shape} for rates of shape "
@@ -324,7 +333,7 @@ def law_of(owner: str, mix: MixedMode | Callable[..., npt.ArrayLike]) -> MixedMo
     missing = missing_members(mix, MixedMode)
     if missing:
         raise InputError(
-            f"{owner}: mix = {mix!r} is no mode-mix law; give one with its exponents, "
+            f"{owner}: mix = {shown(mix)} is no mode-mix law; give one with its exponents, "
             f"BK(eta=...), Reeder(eta=...) or Power(am=..., an=...), or a function of the rates "
             f"({missing})"
         )

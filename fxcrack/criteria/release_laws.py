@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import positive, table
+from fxcrack.base.checks import positive, table, whole
 from fxcrack.base.errors import InputError
 
 Driver = Literal["once", "increments", "time", "opening"]
@@ -121,13 +121,10 @@ class RampRelease(ReleaseLaw):
 
     def __post_init__(self) -> None:
         """Check the number of increments."""
-        if self.increments is not None and not (
-            isinstance(self.increments, int | np.integer) and self.increments >= 1
-        ):
-            raise InputError(
-                f"RampRelease: increments = {self.increments!r} must be a whole number, at "
-                "least 1; None for a ramp with opening"
-            )
+        if self.increments is not None:
+            words = "None for a ramp with opening"
+            number_of = whole("RampRelease", "increments", self.increments, words=words)
+            object.__setattr__(self, "increments", number_of)
 
     @property
     def driver(self) -> Driver:
@@ -155,7 +152,7 @@ class ProgressiveRelease(ReleaseLaw):
     """The force falls linearly with opening so that exactly the toughness is dissipated.
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
-    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A/|F0|.
+    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A divided by the size of F0.
     """
 
     driver: ClassVar[Driver] = "opening"

@@ -12,8 +12,9 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import number, positive, table
+from fxcrack.base.checks import is_function, list_of, number, positive, table
 from fxcrack.base.errors import InputError
+from fxcrack.base.positions import numbers_at
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,9 @@ class Tabulated:
 Property = float | Sequence[float] | Array | Callable[[Array], npt.ArrayLike] | Tabulated
 """A number, one value per slave node, a function of position, or a table against temperature.
 
-A function is given positions of shape (n, gdim), so ``x[:, 0]`` is the first coordinate, and
-returns n values. The values per slave node are in the order of the slave nodes of the interface.
+A function is given positions of shape (3, n), so ``x[0]`` is the first coordinate, and returns n
+values (:mod:`fxcrack.base.positions`). The values per slave node are in the order of the slave
+nodes of the interface.
 """
 
 
@@ -64,9 +66,9 @@ def check_property(owner: str, name: str, value: Property, n_slave: int | None =
         InputError: A number is not positive, or values per slave node are too few, too many, NaN or
             not positive; the message names the nodes.
     """
-    if isinstance(value, Tabulated) or callable(value):
+    if isinstance(value, Tabulated) or is_function(value):
         return
-    if np.ndim(value) == 0:
+    if list_of(value) is None:
         positive(owner, **{name: value})
         return
     array = _per_node(owner, name, value)
@@ -118,16 +120,9 @@ def resolve(
                 "give Debond(temperature=...), or the property as a number"
             )
         result = np.broadcast_to(value.at(temperature), (n,))
-    elif callable(value):
-        result = np.asarray(value(np.asarray(x, dtype=np.float64)), dtype=np.float64)
-        if result.shape not in ((), (n,)):
-            raise InputError(
-                f"{owner}: the function given as {name} returned shape {result.shape} for "
-                f"positions of shape {np.shape(x)}; it must return {n} values (the first "
-                "coordinate is x[:, 0])"
-            )
-        result = np.broadcast_to(result, (n,))
-    elif np.ndim(value) == 0:
+    elif is_function(value):
+        result = numbers_at(owner, name, value, np.asarray(x, dtype=np.float64))
+    elif list_of(value) is None:
         result = np.full(n, number(owner, name, value))
     else:
         check_property(owner, name, value, n_slave)
@@ -138,10 +133,11 @@ def resolve(
 
 def _per_node(owner: str, name: str, value: object) -> Array:
     try:
-        array = np.asarray(value, dtype=np.float64)
+        array = np.asarray(value)
+        array = array.astype(np.float64) if array.dtype.kind in "fiu" else np.empty((0, 0))
     except (TypeError, ValueError):
         array = np.empty((0, 0))
-    if array.ndim != 1:
+    if array.ndim != 1 or not array.size:
         raise InputError(
             f"{owner}: {name} must be a number, a flat list of one number per slave node, a "
             "function of position or a Tabulated, but it is a "

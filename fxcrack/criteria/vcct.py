@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import not_negative, number
+from fxcrack.base.checks import keep_floats, list_of, not_negative, number
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.energy_release import RateCriterion
-from fxcrack.criteria.toughness import Property, Tabulated
+from fxcrack.criteria.toughness import Property
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +29,7 @@ class VCCT(RateCriterion):
 
     Attributes:
         GIc: Mode I toughness [force/length]: a number, one value per slave node, a function of
-            position (n, gdim) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
+            position (3, n) -> (n,), or a :class:`~fxcrack.criteria.toughness.Tabulated`.
         GIIc: Mode II toughness, likewise; GIc when not given.
         GIIIc: Mode III toughness, likewise; GIIc when not given.
         mix: :class:`~fxcrack.BK`, :class:`~fxcrack.Power`, :class:`~fxcrack.Reeder`, or a function
@@ -52,6 +52,7 @@ class VCCT(RateCriterion):
         """Check everything that does not need the interface."""
         super().__post_init__()
         not_negative(self._owner, viscosity=self.viscosity)
+        keep_floats(self, "viscosity")
         unstable = self.unstable_tolerance
         if unstable is None:
             return
@@ -91,7 +92,7 @@ class EnhancedVCCT(VCCT):
                     "propagation; give both or neither"
                 )
         for name, value in self._properties().items():
-            if not (isinstance(value, Tabulated) or callable(value)) and np.ndim(value) > 0:
+            if list_of(value) is not None:
                 raise InputError(
                     f"{self._owner}: {name} is given per slave node, which only VCCT and fatigue "
                     "allow; give a number, a function of position or a table against temperature"
@@ -99,8 +100,9 @@ class EnhancedVCCT(VCCT):
         super().__post_init__()
 
     def _properties(self) -> dict[str, Property]:
-        given = {"GIc_p": self.GIc_p, "GIIc_p": self.GIIc_p, "GIIIc_p": self.GIIIc_p}
-        return super()._properties() | {k: v for k, v in given.items() if v is not None}
+        given = {"GIIc_p": self.GIIc_p, "GIIIc_p": self.GIIIc_p}
+        others = {name: value for name, value in given.items() if value is not None}
+        return {**super()._properties(), "GIc_p": self.GIc_p, **others}
 
     def propagation_toughness_at(
         self,

@@ -62,8 +62,9 @@ _SHAPES = {
 _MODELS = {"CPE": "plane strain", "CPS": "plane stress", "CAX": "axisymmetric", "C3D": "solid"}
 
 _REFUSED = (
-    (r"S[0-9]|S3|STRI|SAX", "shells are not available yet; use solid elements such as C3D8I"),
-    (r"SC[68]", "continuum shells are not available yet; use solid elements such as C3D8I"),
+    (r"S[0-9]|S3|STRI|SAX", "shells are not available yet; use continuum shells (SC8R) or solid "
+     "elements (C3D20R)"),
+    (r"SC6", "prisms have facets of two kinds, which DOLFINx meshes do not; use SC8R"),
     (r"CSS8", "solid shells are not available; use solid elements such as C3D8I"),
     (r"C3D(6|15|18)", "prisms have facets of two kinds, which DOLFINx meshes do not; use hexahedra "
      "or tetrahedra"),
@@ -83,6 +84,12 @@ _REFUSED = (
 """Patterns of element types that are refused, with what would help: the one place to look."""
 
 
+_STACKED = (
+    "the continuum shell is replaced by one of second order with 27 nodes; all elements of the "
+    "deck are raised to the second order"
+)
+
+
 @dataclass(frozen=True)
 class ElementType:
     """An element type of a deck.
@@ -94,6 +101,7 @@ class ElementType:
         model: Kinematic model: plane strain, plane stress, axisymmetric or solid.
         n_nodes: Nodes the deck gives for each element.
         notes: What is computed in another way than the type says.
+        stacked: Whether it is a continuum shell: plies lie from its face S1 to its face S2.
     """
 
     name: str
@@ -102,6 +110,7 @@ class ElementType:
     model: str
     n_nodes: int
     notes: tuple[str, ...] = ()
+    stacked: bool = False
 
     @property
     def gdim(self) -> int:
@@ -120,6 +129,8 @@ def element_type(name: str) -> ElementType | str:
     Args:
         name: In capitals, e.g. "C3D20R".
     """
+    if name in ("SC8", "SC8R"):
+        return ElementType(name, "hexahedron", 1, "solid", 8, (_STACKED,), stacked=True)
     match = re.fullmatch(r"(CPE|CPS|CAX|C3D)(\d+)([A-Z]*)", name)
     if match and match[1] in _MODELS:
         family, n = match[1], int(match[2])

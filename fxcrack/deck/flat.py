@@ -294,6 +294,11 @@ class Flat:
             )
         return np.asarray(rows[cells, face - 1])
 
+    def outer_side(self, cells: Ints, face: int) -> Ints:
+        """Nodes of a face of some cells where it lies on the outside; rows as of :meth:`faces`."""
+        rows, count = self._face_ids
+        return np.asarray(rows[cells, face - 1][count[cells, face - 1] == 1])
+
     def outside(self, cells: Ints) -> Ints:
         """Nodes of the faces of some cells that no other cell has; rows as of :meth:`faces`."""
         rows, count = self._face_ids

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
     BK,
@@ -33,21 +32,6 @@ from fxcrack.deck.thermal import NodalField
 _TYPES = ("CRITICAL STRESS", "COD", "CRACK LENGTH", "VCCT", "ENHANCED VCCT", "FATIGUE")
 _LAWS = ("BK", "POWER", "REEDER")
 _MODES = ("GIc", "GIIc", "GIIIc")
-
-
-@dataclass(frozen=True, eq=False)
-class NodalToughness:
-    """Toughness given at the slave nodes, as a function of position.
-
-    Attributes:
-        field: Values at the slave nodes.
-    """
-
-    field: NodalField
-
-    def __call__(self, x: Array) -> Array:
-        """Values at positions of shape (n, gdim)."""
-        return self.field.nearest(np.asarray(x))
 
 
 class NodalRates:
@@ -74,9 +58,7 @@ class NodalRates:
                 else:
                     nodes = flat.nodes(card, row.text(0), row.index)
                     first = row.number(1)
-                    self.rates[nodes] = [first, row.number(2, first), row.number(3, math.nan)] if (
-                        not row.text(3)
-                    ) else [first, row.number(2, first), row.number(3)]  # fmt: skip
+                    self.rates[nodes] = [first, row.number(2, first), row.number(3, math.nan)]
 
     def _fill(self, row: Row) -> None:
         """Values that vary linearly between those of two nodes or sets."""
@@ -103,7 +85,7 @@ class NodalRates:
                     a[mine]
                 ] + share * self.rates[b[mine]]
 
-    def on(self, card: Card, slave: Ints) -> dict[str, NodalToughness]:
+    def on(self, card: Card, slave: Ints) -> dict[str, NodalField]:
         """Toughness on a slave surface by mode.
 
         Args:
@@ -126,8 +108,7 @@ class NodalRates:
         rates = np.nan_to_num(rates, nan=1.0)
         x = flat.points[slave][:, : flat.kind.gdim]
         return {
-            mode: NodalToughness(NodalField(x, flat.nodal(rates[:, i])[slave]))
-            for i, mode in enumerate(_MODES)
+            mode: NodalField(x, flat.nodal(rates[:, i])[slave]) for i, mode in enumerate(_MODES)
         }
 
 
@@ -260,7 +241,7 @@ def _length(card: Card, flat: Flat, groups: Groups, finite: bool) -> Criterion:
     )
 
 
-def _rates(card: Card, kind: str, nodal: dict[str, NodalToughness] | None) -> Criterion:
+def _rates(card: Card, kind: str, nodal: dict[str, NodalField] | None) -> Criterion:
     law = card.choose("MIXED MODE BEHAVIOR", _LAWS, "BK")
     n_exponents = 3 if law == "POWER" else 1
     if kind == "FATIGUE":

@@ -54,6 +54,10 @@ _READ = {
     "END ASSEMBLY": ("", ""),
     # sections, materials
     "SOLID SECTION": ("ELSET, MATERIAL, ORIENTATION", "CONTROLS"),
+    "SHELL SECTION": (
+        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON",
+        "CONTROLS",
+    ),
     "ORIENTATION": ("NAME, SYSTEM, DEFINITION", ""),
     "MATERIAL": ("NAME", "SRANGE, RTOL"),
     "ELASTIC": ("TYPE", "MODULI"),
@@ -130,7 +134,7 @@ _OUTPUT = (
 
 _NUMERICS = "CONTACT CONTROLS, SECTION CONTROLS, HOURGLASS STIFFNESS, SOLVER CONTROLS"
 
-_SHELLS = "shells are not available yet; model the part with solid elements (C3D8I, C3D20R)"
+_SHELLS = "these shells are not available; use continuum shells (SC8R) or solid elements (C3D20R)"
 _USER = (
     "user subroutines cannot be run; use a material that fxcrack has (ELASTIC, PLASTIC, "
     "HYPERELASTIC with NEO HOOKE)"
@@ -147,7 +151,6 @@ _THERMAL = "heat is not computed; prescribe temperatures by *TEMPERATURE"
 _PERTURBATION = "only *STATIC, *VISCO, *DYNAMIC, *DIRECT CYCLIC with FATIGUE and *FATIGUE are"
 
 _REFUSED = {
-    "SHELL SECTION": _SHELLS,
     "SHELL GENERAL SECTION": _SHELLS,
     "TRANSVERSE SHEAR STIFFNESS": _SHELLS,
     "TRANSVERSE SHEAR": _SHELLS,

@@ -365,6 +365,7 @@ _PLACES = {
     "ELSET": _Walk._elset,
     "SURFACE": _Walk._surface,
     "SOLIDSECTION": _Walk._section,
+    "SHELLSECTION": _Walk._section,
     "ORIENTATION": _Walk._orientation,
     "MATERIAL": _Walk._material,
     "SURFACEINTERACTION": _Walk._interaction,

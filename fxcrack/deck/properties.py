@@ -8,7 +8,9 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.materials import Isotropic, Material, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.deck.cards import Card, Row, key
@@ -60,15 +62,17 @@ class _Sections:
     def read(self) -> Sections:
         flat = self._flat
         owner = np.full(len(flat.cells), -1, dtype=np.int64)
-        kinds: list[tuple[str, Frame, float]] = []
+        kinds: list[tuple[str | Card, Frame, float]] = []
         cards: list[tuple[Card, str]] = []
         for place, placed in flat.placed.items():
             for card in placed.space.sections:
                 cells = flat.in_space(place, card, card.text("ELSET"))
+                self._check_elements(card, cells, placed.space)
+                is_shell = card.keyword == "SHELLSECTION"
                 kind = (
-                    self._known(card),
+                    card if is_shell else self._known(card),
                     self._frame(card, placed.space),
-                    self._thickness(card),
+                    1.0 if is_shell else self._thickness(card),
                 )
                 if kind not in kinds:
                     kinds.append(kind)
@@ -93,7 +97,7 @@ class _Sections:
                 f"the sections have different thicknesses ({', '.join(map(str, thickness))}); a "
                 "plane model has one"
             )
-        damping = {self._damping(kinds[i][0]) for i in used}
+        damping = {pair for i in used for pair in self._damping(kinds[i][0])}
         if len(damping) > 1:
             cards[used[1]][0].fail(
                 "the materials have different *DAMPING; all bodies must have the same"
@@ -101,7 +105,11 @@ class _Sections:
         materials = {}
         for i in used:
             name = self._groups.cells(cards[i][1], np.flatnonzero(owner == i), words="elements")
-            materials[name] = self._material(self._materials[kinds[i][0]], kinds[i][1])
+            what, frame, _ = kinds[i]
+            if isinstance(what, Card):
+                materials[name] = self._shell(what, name, np.flatnonzero(owner == i), frame)
+            else:
+                materials[name] = self._material(self._materials[what], frame)
         return Sections(
             materials,
             self._model(thickness.pop()),
@@ -158,11 +166,69 @@ class _Sections:
         first, second = (tuple(float(c) for c in row) for row in axes[:2])
         return first, second  # type: ignore[return-value]
 
+    # -- continuum shells ----------------------------------------------------------------
+
+    def _check_elements(self, card: Card, cells: Ints, space: Space) -> None:
+        """Refuse a shell section of solid elements and a solid section of continuum shells."""
+        stacked = [b for b in space.elements.values() if b.kind.stacked]
+        labels = np.concatenate([b.table.labels for b in stacked]) if stacked else np.zeros(0)
+        placed = next(p for p in self._flat.placed.values() if p.space is space)
+        shells = np.isin(cells, placed.cell_of(labels.astype(np.int64)))
+        if card.keyword == "SHELLSECTION" and not shells.all():
+            card.fail("it needs continuum shell elements (SC8R); give *SOLID SECTION to others")
+        if card.keyword == "SOLIDSECTION" and shells.any():
+            card.fail("continuum shell elements need *SHELL SECTION")
+
+    def _ply_materials(self, card: Card) -> list[str]:
+        """Keys of the materials of a shell section's plies, bottom first."""
+        if not card.has("COMPOSITE"):
+            return [self._known(card)]
+        names = []
+        for row in card.need_rows("thickness, integration points, material, angle"):
+            if key(row.text(2)) not in self._materials:
+                row.fail(f"there is no material '{row.text(2)}'; define it by *MATERIAL")
+            names.append(key(row.text(2)))
+        return names
+
+    def _shell(self, card: Card, name: str, cells: Ints, frame: Frame) -> Material:
+        """A continuum shell from the faces S1 of its elements to their faces S2."""
+        if card.number("STACK DIRECTION", 3.0) != 3.0:
+            card.fail("STACK DIRECTION must be 3: plies lie from face S1 to face S2")
+        if card.has("POISSON"):
+            card.fail("POISSON is not available: the thickness follows the elements")
+        sides = {}
+        for side, face in (("bottom", 1), ("top", 2)):
+            rows = self._flat.outer_side(cells, face)
+            if not len(rows):
+                card.fail(f"no face S{face} of the elements lies on the outside of the body")
+            sides[side] = self._groups.facets(f"{name} {side}", rows)
+        plies = []
+        angles, thicknesses = [0.0], [1.0]
+        if card.has("COMPOSITE"):
+            rows_of = card.rows()
+            thicknesses = [row.number(0) for row in rows_of]
+            angles = [row.number(3, 0.0, what="the angle of the ply") for row in rows_of]
+        for material, angle, thickness in zip(
+            self._ply_materials(card), angles, thicknesses, strict=True
+        ):
+            made = self._material(self._materials[material], _GLOBAL)
+            plies.append(Ply(thickness, angle, made))
+        try:
+            section = Laminate(plies) if card.has("COMPOSITE") else plies[0].material
+            assert section is not None
+            return ContinuumShell(section, axis=frame[0], **sides)
+        except InputError as error:
+            return card.fail(str(error))
+
     # -- materials -----------------------------------------------------------------------
 
-    def _damping(self, name: str) -> tuple[float, float]:
-        card = self._materials[name].first("DAMPING")
-        return (0.0, 0.0) if card is None else (card.number("ALPHA", 0.0), card.number("BETA", 0.0))
+    def _damping(self, what: str | Card) -> set[tuple[float, float]]:
+        names = [what] if isinstance(what, str) else self._ply_materials(what)
+        cards = [self._materials[name].first("DAMPING") for name in names]
+        return {
+            (0.0, 0.0) if c is None else (c.number("ALPHA", 0.0), c.number("BETA", 0.0))
+            for c in cards
+        }
 
     def _material(self, family: Family, frame: Frame) -> Material:
         try:

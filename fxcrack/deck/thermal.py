@@ -33,14 +33,10 @@ class NodalField:
     def _tree(self) -> cKDTree:
         return cKDTree(self.x)
 
-    def nearest(self, x: Array) -> Array:
-        """Values at positions of shape (m, gdim), those of the nearest node, shape (m,)."""
-        _, found = self._tree.query(x[:, : self.x.shape[1]])
-        return np.asarray(self.values[found])
-
     def __call__(self, x: Array) -> Array:
-        """Values at positions of shape (3, m)."""
-        return self.nearest(np.asarray(x).T)
+        """Values at positions of shape (3, m), those of the nearest node, shape (m,)."""
+        _, found = self._tree.query(np.asarray(x).T[:, : self.x.shape[1]])
+        return np.asarray(self.values[found])
 
 
 class Temperatures:

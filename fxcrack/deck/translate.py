@@ -71,6 +71,9 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     Raises:
         DeckError: Something is missing, contradicts itself or has no word here.
     """
+    spaces = [model.root, *model.instances.values()]
+    if any(block.kind.stacked for space in spaces for block in space.elements.values()):
+        order = 2
     flat = Flat(model, order)
     groups = Groups(flat)
     cards = _model_cards(flat)

@@ -107,6 +107,29 @@ class ContactSystem(JumpSystem):
 
     # -- contact -------------------------------------------------------------------------
 
+    def pressure(self, state: Equilibrium, rows: Ints) -> Array:
+        """Contact forces on the slave side at some normal components, shape (len(rows),), force.
+
+        A bond whose force still falls carries its given force beside them.
+        """
+        return self.forces(state, rows) - state.force[rows]
+
+    def closing(self, here: Equilibrium, point: Equilibrium) -> Ints:
+        """Closed components whose faces overlap in one state and no longer in a later one.
+
+        Args:
+            here: The first state.
+            point: The later state, whose contact states the present ones are.
+
+        Returns:
+            Numbers of retained jumps, shape (k,): none unless faces overlap initially.
+        """
+        rows = np.flatnonzero(self.closed & (self.gap < 0.0))
+        if len(rows):
+            overlap = -(here.jump + self.gap)[rows]
+            rows = rows[overlap > _ROUND_OFF * np.abs(self.gap[rows]).max()]
+        return rows
+
     def _violations(self, state: Equilibrium) -> tuple[Bools, Array, Array]:
         """Contact components on the wrong side; gaps; pressures of the closed ones.
 

@@ -43,6 +43,7 @@ class InterfaceState:
         equilibrium: Loads, given forces, jumps and conjugates.
         states: Which components are free, closed, may be in contact; softening bonds; friction.
         friction_energy: Energy dissipated by friction so far.
+        overlap_energy: Energy given by contact that pushed overlapping faces apart so far.
     """
 
     index: list[Ints]
@@ -50,6 +51,7 @@ class InterfaceState:
     equilibrium: Equilibrium
     states: ComponentStates
     friction_energy: float
+    overlap_energy: float = 0.0
 
     # -- the present state, and back to it -----------------------------------------------
 
@@ -61,6 +63,7 @@ class InterfaceState:
         index: list[Ints],
         equilibrium: Equilibrium,
         friction_energy: float,
+        overlap_energy: float = 0.0,
     ) -> InterfaceState:
         """The present state of a system.
 
@@ -70,9 +73,10 @@ class InterfaceState:
             index: Numbers of its retained jumps per pair, -1 elsewhere, shape (n_nodes, gdim).
             equilibrium: Present equilibrium.
             friction_energy: Energy dissipated by friction so far.
+            overlap_energy: Energy given by contact that pushed overlapping faces apart so far.
         """
         bonded = [front.bonded.copy() for front in fronts]
-        return cls(index, bonded, equilibrium, system.snapshot(), friction_energy)
+        return cls(index, bonded, equilibrium, system.snapshot(), friction_energy, overlap_energy)
 
     def restore_bonds(self, fronts: list[Front]) -> None:
         """Give fronts the bonded nodes of this state."""
@@ -190,6 +194,8 @@ class InterfaceState:
             out["friction.reference"] = friction.reference
             out["friction.error"] = np.array([friction.error])
             out["friction.energy"] = np.array(self.friction_energy)
+        if self.overlap_energy:
+            out["overlap.energy"] = np.array(self.overlap_energy)
         return out | _arrays_of_bonds(self.states.bonds, self.states.finished)
 
     @classmethod
@@ -233,7 +239,8 @@ class InterfaceState:
             finished=float(arrays["soft.finished"]),
             friction=friction,
         )
-        return cls(index, bonded, equilibrium, states, energy)
+        overlap = float(arrays.get("overlap.energy", np.zeros(())))
+        return cls(index, bonded, equilibrium, states, energy, overlap)
 
 
 def allow_contact(system: ContactSystem, pair: Pair, front: Front, index: Ints) -> None:

@@ -1,7 +1,8 @@
 """Extent of a crack: open length along a line, or open area over the front width.
 
 2-D: the length of the open run that ends at a tip, measured along the slave surface from the end
-of the surface; half of it when both its ends are tips.
+of the surface; half of it when both its ends are tips, or were until one of them reached the end of
+the surface. Once nothing is bonded, the open length of each initial tip.
 3-D: open area divided by the length of the initial front; the facets cut by the front count half.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.front import Front
 from fxcrack.interface.tips import Tips
 
@@ -30,6 +31,11 @@ class CrackExtent:
         self._known: tuple[int, list[tuple[int, float]]] = (-1, [])
         if self._line:
             self._paths = [_along(path, surface.x) for path in _polylines(surface.facets[:, :2])]
+            bonded = front.bonded
+            self._initially = [
+                (bool(bonded[nodes[0]]), bool(bonded[nodes[-1]]), _changes(bonded[nodes]))
+                for nodes, _ in self._paths
+            ]
 
     def area(self, tips: Tips) -> float:
         """Open area (length times thickness or ring in 2-D), length^2."""
@@ -38,7 +44,11 @@ class CrackExtent:
         # the front stands half-way into the facets it cuts; with second-order shape functions
         # a corner node stands for a sixth of each facet
         share = 0.5 if surface.order == 1 else 1.0 / 6.0
-        return total + share * float((tips.width * tips.d_behind).sum())
+        # with open parts on both sides of a node all of its area counts
+        beside = np.where(
+            tips.ligament, surface.areas[tips.node], share * tips.width * tips.d_behind
+        )
+        return total + float(beside.sum())
 
     def length(self, tips: Tips) -> float:
         """Crack length: of the longest run in 2-D, the mean over the front in 3-D."""
@@ -54,7 +64,9 @@ class CrackExtent:
 
     def _measure(self) -> list[tuple[int, float]]:
         out: list[tuple[int, float]] = []
-        for nodes, s in self._paths:
+        for (nodes, s), (from_first, from_last, n_tips) in zip(
+            self._paths, self._initially, strict=True
+        ):
             bonded = self._front.bonded[nodes]
             # runs of open nodes; each reaches to the bonded nodes on both sides
             edge = np.flatnonzero(np.diff(np.concatenate([[True], bonded, [True]]).astype(int)))
@@ -62,8 +74,16 @@ class CrackExtent:
                 left, right = max(first - 1, 0), min(stop, len(nodes) - 1)
                 tips = [int(nodes[k]) for k in {left, right} if bonded[k]]
                 total = float(s[right] - s[left])
-                out += [(tip, total / len(tips)) for tip in sorted(tips)] or [(-1, total)]
+                # tips that have reached an end of the surface still share the length
+                share = int(bonded[left] or from_first) + int(bonded[right] or from_last)
+                share = share or max(n_tips, 1)
+                out += [(tip, total / share) for tip in sorted(tips)] or [(-1, total / share)]
         return out
+
+
+def _changes(bonded: Bools) -> int:
+    """Number of places along a line where open nodes are beside bonded ones."""
+    return int(np.count_nonzero(np.diff(bonded.astype(int))))
 
 
 def _polylines(ends: Ints) -> list[Ints]:

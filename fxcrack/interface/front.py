@@ -5,6 +5,10 @@ minus the gradient of the open/bonded indicator over the facets around it, so it
 structured mesh; with the normal n and the front tangent t = n x s it forms the local frame.
 The wake point lies where the ray -s leaves the facets around the node; openings are
 interpolated there. Second-order surfaces use the corner-midside-corner lines of their facets.
+
+The last bonded node between two open parts is a tip of both (:attr:`Tips.ligament`): it takes the
+means of what lies on either side, so that neither the numbering of the nodes nor the orientation of
+the line has a say. Where places are equal otherwise, :func:`_first_by_place` decides.
 """
 
 from __future__ import annotations
@@ -29,6 +33,24 @@ _LINES = {
     "interval": ((0, 2, 1),),
     "quadrilateral": ((0, 4, 1), (2, 7, 3), (0, 5, 2), (1, 6, 3), (5, 8, 6), (4, 8, 7)),
 }
+
+
+_SAME = 1e-9
+"""Lengths and cosines that differ by less than this fraction are equal."""
+_PLACES = np.array([0.8147, 0.4351, 0.3836])
+"""Direction along which equal places are ordered: across no symmetry that meshes usually have."""
+
+
+def _first_by_place(values: Array, x: Array) -> int:
+    """Position of the largest of some values; of equal ones the first along a fixed direction.
+
+    Args:
+        values: Shape (n,), of the size of lengths in ``x`` or of 1.
+        x: Places they belong to, shape (n, 3); unlike numbers of nodes, these are the mesh's own.
+    """
+    top = float(values.max())
+    equal = np.flatnonzero(values >= top - _SAME * max(abs(top), float(np.abs(values).max())))
+    return int(equal[np.argmin(x[equal] @ _PLACES)]) if len(equal) > 1 else int(equal[0])
 
 
 class Front:
@@ -135,9 +157,11 @@ class Front:
         weight = np.exp(-(beyond**2))
         mean = weight @ direction
         length = np.linalg.norm(mean, axis=1, keepdims=True)
-        # opposite fronts at one distance: no mean, the first of them
+        # opposite fronts at one distance: no mean, one of them
         lost = length < 0.5 * weight.sum(axis=1, keepdims=True)
         nearest = direction[np.argmin(distance, axis=1)]
+        for i in np.flatnonzero(lost[:, 0]):
+            nearest[i] = direction[_first_by_place(-distance[i], centre)]
         return np.where(lost, nearest, mean / np.maximum(length, 1e-300))
 
     def follow(self, x: Array) -> None:
@@ -217,7 +241,8 @@ class Front:
         if not found:
             e, z = np.zeros(0, dtype=np.int64), np.zeros(0)
             return Tips(e, e.reshape(0, k), np.zeros((0, k, 2), dtype=np.int64),
-                        np.zeros((0, k, 2)), np.zeros((0, 3, 3)), z, z, z, z)  # fmt: skip
+                        np.zeros((0, k, 2)), np.zeros((0, 3, 3)), z, z, z, z,
+                        np.zeros(0, dtype=bool))  # fmt: skip
         return Tips(
             np.array([t.node for t in found]),
             np.array([t.force_nodes for t in found]),
@@ -228,6 +253,7 @@ class Front:
             np.array([t.d_behind for t in found]),
             np.array([t.width for t in found]),
             np.array([t.area for t in found]),
+            np.array([t.ligament for t in found]),
         )
 
     def tip(self, node: int) -> Tip:
@@ -241,8 +267,8 @@ class Front:
             self._cache[node] = found
         return found
 
-    def _growth(self, node: int, s: FacetSurface) -> Array:
-        """Unit growth direction in the tangent plane."""
+    def _growth(self, node: int, s: FacetSurface) -> Array | None:
+        """Unit growth direction in the tangent plane; None where it is open on opposite sides."""
         indicator = (~self.bonded).astype(float)
         total = np.zeros(3)
         scale = 0.0
@@ -254,19 +280,56 @@ class Front:
         total -= (total @ normal) * normal
         length = norm(total)
         if length < 1e-6 * max(scale, 1e-300):
-            # open on all sides: grow away from the first open neighbour
-            behind = next(k for k in self.neighbours(node) if not self.bonded[k])
-            total = s.x[node] - s.x[behind]
-            total -= (total @ normal) * normal
-            length = norm(total)
+            return None
         return np.asarray(total / length)
 
     def _frame(self, node: int, growth: Array, s: FacetSurface) -> Array:
         normal = -s.normals[node]
         return np.array([normal, growth, cross(normal, growth)]).T
 
+    def _across(self, node: int, s: FacetSurface, ends: Ints) -> tuple[Array, Ints, float]:
+        """Opposite open neighbours of a node between two open parts.
+
+        Args:
+            node: The node.
+            s: The surface, where it is now or undeformed.
+            ends: Its open neighbours, shape (k,).
+
+        Returns:
+            Unit vector in the tangent plane away from the nearest of them; positions in ``ends`` of
+            that and of the one most nearly opposite to it, shape (2,), twice the same where none
+            is; their mean distance, length.
+        """
+        # the undeformed surface chooses, so that bodies that move do not change it
+        reference = self._undeformed.x
+        length = np.linalg.norm(reference[ends] - reference[node], axis=1)
+        near = _first_by_place(-length, reference[ends])
+        normal = s.normals[node]
+        growth = s.x[node] - s.x[ends[near]]
+        growth = growth - (growth @ normal) * normal
+        growth = growth / norm(growth)
+        back = reference[node] - reference[ends[near]]
+        cosine = (reference[ends] - reference[node]) @ back / (length * length[near])
+        far = _first_by_place(cosine, reference[ends])
+        both = np.array([near, far if cosine[far] >= 0.3 else near])
+        return np.asarray(growth), both, float(length[both].mean())
+
+    def _ligament(self, node: int, s: FacetSurface) -> Tip:
+        """Geometry of a first-order node between two open parts: means of both sides."""
+        ends = self.neighbours(node)
+        ends = ends[~self.bonded[ends]]
+        growth, both, mean = self._across(node, s, ends)
+        area = float(s.areas[node])
+        width = float(s.breadth[node]) if s.dim == 1 else area / mean
+        return Tip(
+            node, np.array([node]), ends[both][None], np.array([[0.5, 0.5]]),
+            self._frame(node, growth, s), mean, mean, width, area, True,
+        )  # fmt: skip
+
     def _tip(self, node: int, s: FacetSurface) -> Tip:
         growth = self._growth(node, s)
+        if growth is None:
+            return self._ligament(node, s)
         d_behind, wake, weights = self._ray(node, -growth, s, open_side=True)
         d_ahead, ahead, _ = self._ray(node, growth, s, open_side=False)
         if s.dim == 1:
@@ -314,10 +377,10 @@ class Front:
         cosine = vectors @ direction / np.where(length > 0.0, length, 1.0)
         if not near or cosine.max() < 0.3:
             if open_side:
-                k = int(np.argmin(length))
+                k = _first_by_place(-length, s.x[near])
                 return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
             return 0.0, np.array([node, node]), np.array([1.0, 0.0])
-        k = int(np.argmax(cosine))
+        k = _first_by_place(cosine, s.x[near])
         return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
 
     def _tip_on_lines(self, node: int, s: FacetSurface) -> Tip:
@@ -326,16 +389,19 @@ class Front:
         vectors = s.x[links[:, 0]] - s.x[node]
         length = np.linalg.norm(vectors, axis=1)
         is_open = ~self.bonded[links[:, 0]] & ~self.bonded[links[:, 1]]
+        if s.dim == 1 and is_open.sum() > 1:
+            return self._ligament_on_line(node, s, links[is_open])
         if s.dim == 1:
             behind = int(np.argmax(is_open))
         else:
-            behind = int(np.argmax(np.where(is_open, -(vectors @ heading) / length, -2.0)))
+            along = np.where(is_open, -(vectors @ heading) / length, -2.0)
+            behind = _first_by_place(along, s.x[links[:, 0]])
         growth = -vectors[behind] / length[behind]
         normal = s.normals[node]
         growth = growth - (growth @ normal) * normal
         growth /= np.linalg.norm(growth)
         cosine = vectors @ growth / length
-        ahead = int(np.argmax(cosine))
+        ahead = _first_by_place(cosine, s.x[links[:, 0]])
         corner, middle = links[behind]
         if cosine[ahead] < 0.3 or ahead == behind or not self.bonded[links[ahead, 1]]:
             # the surface ends, or the tip on the other side has released the midside node
@@ -353,6 +419,22 @@ class Front:
             node, force_nodes, np.array([[corner, corner], [middle, middle]]),
             np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth, s), d_ahead, d_behind,
             width, across * d_ahead if d_ahead > 0.0 else 0.5 * width * d_behind,
+        )  # fmt: skip
+
+    def _ligament_on_line(self, node: int, s: FacetSurface, links: Ints) -> Tip:
+        """Geometry of a second-order corner node between two open parts: means of both sides.
+
+        Args:
+            node: The node.
+            s: The surface, where it is now or undeformed.
+            links: Its open neighbours and the midside nodes before them, shape (k, 2).
+        """
+        growth, both, mean = self._across(node, s, links[:, 0])
+        width = float(s.breadth[node])
+        # both tips have released their midside nodes: half of an element is left, of their mean
+        return Tip(
+            node, np.array([node, node]), links[both].T, np.full((2, 2), 0.5),
+            self._frame(node, growth, s), 0.0, mean, width, 0.5 * width * mean, True,
         )  # fmt: skip
 
 

@@ -15,8 +15,19 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.base.checks import format_point
+from fxcrack.base.checks import (
+    flag,
+    format_point,
+    is_count,
+    is_function,
+    keep,
+    list_of,
+    number,
+    shown,
+    text,
+)
 from fxcrack.base.errors import InputError, InterfaceError
+from fxcrack.base.positions import as_marks, marks_at, numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface, gather_surface
@@ -63,19 +74,28 @@ class Interface:
 
     def __post_init__(self) -> None:
         """Refuse contradictions that need no mesh."""
+        for name, value in (("slave", self.slave), ("master", self.master)):
+            text("Interface", name, value)
+        text("Interface", "name", self.name, optional=True)
         if self.slave == self.master:
             raise InterfaceError(
                 f"interface '{self.slave}' pairs a surface with itself; self-contact is not "
                 "possible here: name two distinct facet groups (a surface inside one conforming "
                 "mesh becomes two by read_mesh(path, split=[Split(...)]))"
             )
-        if self.tolerance is not None and not 0.0 < self.tolerance < np.inf:
+        where = f"interface '{self.title}'"
+        for name in ("contact", "normal_only", "strict"):
+            keep(self, **{name: flag(where, name, getattr(self, name))})
+        check_bonded(where, self.bonded)
+        if self.tolerance is not None and not (
+            0.0 < number(where, "tolerance", self.tolerance) < np.inf
+        ):
             raise InterfaceError(
                 f"interface '{self.title}': tolerance = {self.tolerance} must be positive and "
                 "finite; None takes a tenth of the facet size"
             )
-        if self.gap not in ("adjust", "keep"):
-            raise InterfaceError(f"gap = '{self.gap}': choose 'adjust' or 'keep'")
+        if not isinstance(self.gap, str) or self.gap not in ("adjust", "keep"):
+            raise InterfaceError(f"gap = {shown(self.gap)}: choose 'adjust' or 'keep'")
         self._check_friction()
 
     def _check_friction(self) -> None:
@@ -91,13 +111,15 @@ class Interface:
                 f"{where}: friction is not possible with bonds in the normal direction only; leave "
                 "out friction, or bond in all directions"
             )
-        if not callable(self.friction):
-            if isinstance(self.friction, bool) or not isinstance(self.friction, float | int):
+        if not is_function(self.friction):
+            try:
+                mu = number(where, "friction", self.friction)
+            except InputError as error:
                 raise InterfaceError(
-                    f"{where}: friction = {self.friction!r}; give the coefficient, a number such "
-                    "as 0.3, or a function of positions"
-                )
-            check_coefficients(np.atleast_1d(np.asarray(self.friction, dtype=float)), where)
+                    f"{where}: friction = {shown(self.friction)}; give the coefficient, a number "
+                    "such as 0.3, or a function of positions"
+                ) from error
+            check_coefficients(np.array([mu]), where)
 
     @property
     def title(self) -> str:
@@ -157,6 +179,29 @@ class Pair:
         return np.asarray(np.einsum("nkc,nkcj->nkj", each, self.master_maps))
 
 
+def check_bonded(where: str, bonded: object) -> None:
+    """Refuse a bonded set that no surface could make sense of.
+
+    Args:
+        where: Beginning of the message.
+        bonded: What the user gave.
+
+    Raises:
+        InterfaceError: It is neither a name, a function, booleans nor None.
+    """
+    if bonded is None or (isinstance(bonded, str) and bonded) or is_function(bonded):
+        return
+    entries = list_of(bonded) or []
+    good = all(isinstance(e, bool | np.bool_) or (is_count(e) and e in (0, 1)) for e in entries)
+    if not entries or not good:
+        raise InterfaceError(
+            f"{where}: bonded must be the name of a group, a function of position, or one boolean "
+            f"for each slave node (no node numbers and no other numbers), but it is a "
+            f"{type(bonded).__name__}"
+            + (f" that begins with {shown(entries[0])}" if entries else "")
+        )
+
+
 def check_coefficients(mu: Array, where: str) -> None:
     """Refuse coefficients of friction that are negative or no numbers.
 
@@ -187,12 +232,7 @@ def friction_of(interface: Interface, surface: FacetSurface) -> Array | None:
     if not callable(chosen):
         return np.full(n, float(chosen))
     where = f"interface '{interface.title}'"
-    mu = np.asarray(chosen(np.ascontiguousarray(surface.x.T)), dtype=float)
-    if mu.shape != (n,):
-        raise InterfaceError(
-            f"{where}: friction gives shape {mu.shape}; one number for each of the {n} slave nodes "
-            "is needed"
-        )
+    mu = numbers_at(where, "friction", chosen, surface.x, error=InterfaceError)
     check_coefficients(mu, where)
     return mu
 
@@ -250,23 +290,14 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
             log.warn("%s; they are ignored", found)
         return np.asarray(np.isin(surface.dofs, named))
     if callable(chosen):
-        try:
-            marks = np.asarray(chosen(np.ascontiguousarray(surface.x.T)))
-        except Exception as error:  # whatever the user's function may raise
-            raise InterfaceError(
-                f"{where}: the function bonded fails: {error}; it gets positions x of shape (3, n) "
-                "and returns n booleans; join conditions by & or |, each in brackets"
-            ) from error
-    else:
-        marks = np.asarray(chosen)
+        return marks_at(where, "bonded", chosen, surface.x, error=InterfaceError)
+    marks = np.asarray(chosen)
     if marks.shape != (surface.n_nodes,):
         raise InterfaceError(
             f"{where}: bonded gives shape {marks.shape}; one boolean for each of the "
             f"{surface.n_nodes} slave nodes is needed"
         )
-    if not np.all(np.isfinite(marks)):
-        raise InterfaceError(f"{where}: bonded gives NaN or infinity; return booleans")
-    return marks.astype(bool)
+    return as_marks(where, "bonded", marks, error=InterfaceError)
 
 
 def grown_together(slave: FacetSurface, master: FacetSurface, where: str) -> Bools:

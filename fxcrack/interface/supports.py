@@ -13,6 +13,7 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError, InterfaceError, raise_on_all_ranks
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Displacement
 from fxcrack.interface.nodes import InterfaceNodes
@@ -93,12 +94,20 @@ def collect_supports(continuum: Continuum, supports: list[Displacement]) -> Supp
                     f"Displacement('{support.title}') prescribes {axis} in {gdim} dimensions"
                 )
             dofs = layout.dof(nodes, component)
-            values = np.broadcast_to(
-                np.asarray(field(x[nodes].T) if callable(field) else field, dtype=float),
-                (len(nodes),),
-            )
-            if not np.all(np.isfinite(values)):
-                problem = f"Displacement('{support.title}'): {axis} is not a finite number"
+            owner = f"Displacement('{support.title}')"
+            values = np.zeros(len(nodes))
+            try:
+                if callable(field):
+                    values = numbers_at(owner, axis, field, x[nodes])
+                else:
+                    values = np.full(len(nodes), float(field))
+            except InputError as error:  # on this rank, perhaps: said by all ranks below
+                problem = str(error)
+            bad = np.flatnonzero(~np.isfinite(values))
+            if len(bad):
+                at = format_point(x[nodes[bad[0]]])
+                problem = f"{owner}: {axis} is not a finite number ({values[bad[0]]} at {at})"
+                values = np.where(np.isfinite(values), values, 0.0)
             taken = which[dofs] >= 0
             other = np.array([c.support.amplitude != support.amplitude for c in columns] + [False])
             differs = (value[dofs] != values) | (other[which[dofs]] & (values != 0.0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.surface import FacetSurface
 
 
@@ -25,6 +25,9 @@ class Tip:
         d_behind: Distance to the wake point, length.
         width: Front length (times thickness or ring) the node stands for, length.
         area: Area that opens when the node is released, length^2.
+        ligament: Whether it is bonded between two open parts on opposite sides; the wake point is
+            then the mean of one on either side, lengths are means of both sides, and the growth
+            direction is away from the nearer one.
     """
 
     node: int
@@ -36,6 +39,7 @@ class Tip:
     d_behind: float
     width: float
     area: float
+    ligament: bool = False
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,7 @@ class Tips:
     d_behind: Array
     width: Array
     area: Array
+    ligament: Bools
 
     def __len__(self) -> int:
         """Number of tips."""

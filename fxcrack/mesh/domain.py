@@ -9,8 +9,10 @@ import dolfinx.la
 import dolfinx.mesh
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from fxcrack.base.errors import MeshError, raise_on_all_ranks
+from fxcrack.base.positions import marks_at
 from fxcrack.mesh.mesh import Group, Mesh
 from fxcrack.mesh.raw import RawMesh, check_shapes
 
@@ -60,7 +62,7 @@ def mesh_from_domain(
         domain.topology.create_connectivity(dim, tdim)
         domain.topology.create_connectivity(dim, 0)
         if callable(choice):
-            entities = dolfinx.mesh.locate_entities(domain, dim, choice)
+            entities = _marked(comm, domain, dim, name, key, choice)
         else:
             entities = np.asarray(choice)
             raise_on_all_ranks(comm, _headed(name, _fault(domain, key, dim, entities)), MeshError)
@@ -111,6 +113,25 @@ def from_dolfinx(
         titles[dim, tag] = title
     groups = {titles.get(key, f"group_{key[0]}_{key[1]}"): (key[0], e) for key, e in found.items()}
     return mesh_from_domain(domain, groups, name=name)
+
+
+def _marked(
+    comm: MPI.Intracomm, domain: dolfinx.mesh.Mesh, dim: int, name: str, key: str, marker: Marker
+) -> npt.NDArray[np.int32]:
+    """Entities at whose vertices a user's function is true; collective."""
+    problem: str | None = None
+
+    def marks(x: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]:
+        nonlocal problem
+        try:
+            return marks_at(f"mesh '{name}'", f"group '{key}'", marker, x.T, error=MeshError)
+        except MeshError as error:  # on this rank, perhaps: said by all ranks below
+            problem = str(error)
+            return np.zeros(x.shape[1], dtype=bool)
+
+    entities = dolfinx.mesh.locate_entities(domain, dim, marks)
+    raise_on_all_ranks(comm, problem, MeshError)
+    return np.asarray(entities)
 
 
 def _headed(name: str, problem: str | None) -> str | None:

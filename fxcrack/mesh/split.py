@@ -16,8 +16,8 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from fxcrack.base.arrays import Ints
-from fxcrack.base.checks import format_point
-from fxcrack.base.errors import MeshError
+from fxcrack.base.checks import format_point, numbers, text
+from fxcrack.base.errors import InputError, MeshError
 from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct, reference, row_ids
 
 _AMBIGUOUS = 1e-6
@@ -45,6 +45,23 @@ class Split:
     slave: str
     master: str
     toward: tuple[float, ...] | str
+
+    def __post_init__(self) -> None:
+        """Check the names and the direction.
+
+        Raises:
+            MeshError: One is not a text, or the direction holds no numbers.
+        """
+        try:
+            for name in ("surface", "slave", "master"):
+                text("Split", name, getattr(self, name))
+            if isinstance(self.toward, str):
+                text("Split", "toward", self.toward)
+            else:
+                words = "a direction, or the name of a group of cells"
+                numbers("Split", "toward", self.toward, words=words)
+        except InputError as error:
+            raise MeshError(str(error)) from error
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ import dolfinx.plot
 import numpy as np
 from dolfinx import fem
 
+from fxcrack.base.checks import whole
 from fxcrack.base.errors import InputError
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -152,8 +153,7 @@ class FieldSeries:
         self.path = Path(path)
         if self.path.suffix != ".pvd":
             raise InputError(f"fields are written to a .pvd file, not to '{path}'")
-        if every < 1:
-            raise InputError(f"FieldSeries: every = {every} must be 1 or more")
+        every = whole("FieldSeries", "every", every)
         self._analysis = analysis_of(source)
         self._events = events
         self._every = every

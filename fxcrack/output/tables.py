@@ -14,9 +14,11 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import is_function, shown
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.base.positions import marks_at
 from fxcrack.history import Row
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 from fxcrack.steps.bond_records import bond_state
@@ -107,13 +109,10 @@ class BondHistory:
         self._nodes: Ints | None = None
         if where is not None:
             x = self._analysis.pairs[self._p].surface.x
-            marks = np.asarray(where(np.ascontiguousarray(x.T)))
-            if marks.shape != (len(x),):
-                raise InputError(
-                    f"BondHistory: where gives shape {marks.shape}; one boolean for each of the "
-                    f"{len(x)} slave nodes of interface '{interface}' is needed"
-                )
-            self._nodes = np.flatnonzero(marks)
+            if not is_function(where):
+                raise InputError(f"BondHistory: where = {shown(where)} is no function of position")
+            owner = f"BondHistory of interface '{interface}'"
+            self._nodes = np.flatnonzero(marks_at(owner, "where", where, x))
         self.rows: list[Row] = []
 
     def __call__(self, event: str, row: Row) -> None:

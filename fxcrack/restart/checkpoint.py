@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fxcrack.base.checks import check_instance, keep, number, whole
 from fxcrack.base.errors import InputError
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -51,11 +52,12 @@ class Checkpoint:
 
     def __post_init__(self) -> None:
         """Check the file's name and the numbers."""
+        check_instance("Checkpoint", "path", self.path, (str, Path), "'run.npz'")
         if Path(self.path).suffix != ".npz":
             raise InputError(f"Checkpoint('{self.path}'): the file's name must end in .npz")
-        if self.every is not None and self.every < 1:
-            raise InputError(f"Checkpoint: every = {self.every} must be at least 1")
-        if not self.seconds >= 0.0:
+        if self.every is not None:
+            keep(self, every=whole("Checkpoint", "every", self.every))
+        if not number("Checkpoint", "seconds", self.seconds) >= 0.0:
             raise InputError(f"Checkpoint: seconds = {self.seconds} must not be negative")
 
     def file(self, step: int) -> Path:

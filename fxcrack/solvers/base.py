@@ -52,6 +52,7 @@ class Solver(Protocol):
         around: Distances ahead of and behind the tips that the criterion needs, per pair, length.
         rebases: Sets of retained jumps chosen since the step began.
         friction_energy: Energy dissipated by friction so far.
+        overlap_energy: Energy given by contact that pushed overlapping faces apart so far.
         timings: Seconds per phase and number of factorisations.
         law_seconds: Seconds per law of the interface (contact, friction, softening).
         soft_counts: Effort spent on softening bonds.
@@ -75,6 +76,7 @@ class Solver(Protocol):
     around: list[tuple[float, float]]
     rebases: int
     friction_energy: float
+    overlap_energy: float
     timings: Timings
     law_seconds: dict[str, float]
     soft_counts: CohesiveCounts
@@ -197,8 +199,11 @@ class Solver(Protocol):
             Two energies, and the mean jumps, shape (n_retained,), length.
         """
 
-    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
-        """Add what friction dissipates along a piece of the load path to its energy."""
+    def book_contact(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Book the energies of contact along a piece of the load path.
+
+        Friction dissipates; faces that overlap give energy as contact pushes them apart.
+        """
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies, by name."""

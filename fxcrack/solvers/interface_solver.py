@@ -77,6 +77,7 @@ class InterfaceSolver(ABC):
         around: Distances ahead of and behind the tips that the criterion needs, per pair, length.
         rebases: Sets of retained jumps chosen since the step began.
         friction_energy: Energy dissipated by friction so far.
+        overlap_energy: Energy given by contact that pushed overlapping faces apart so far.
         timings: Seconds per phase and number of factorisations.
         law_seconds: Seconds per law of the interface (contact, friction, softening).
         soft_counts: Effort spent on softening bonds.
@@ -105,7 +106,7 @@ class InterfaceSolver(ABC):
         self.active = [False] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
         self.rebases = 0
-        self.friction_energy = 0.0
+        self.friction_energy = self.overlap_energy = 0.0
         self.prepared = False
         gdim = continuum.gdim
         self.index = [np.full((p.surface.n_nodes, gdim), -1, dtype=np.int64) for p in pairs]
@@ -168,7 +169,12 @@ class InterfaceSolver(ABC):
     def interface_state(self) -> InterfaceState:
         """The present state of the interfaces."""
         return InterfaceState.of(
-            self.system, self.fronts, self.index, self.state, self.friction_energy
+            self.system,
+            self.fronts,
+            self.index,
+            self.state,
+            self.friction_energy,
+            self.overlap_energy,
         )
 
     def restore_interfaces(self, saved: InterfaceState) -> None:
@@ -176,6 +182,7 @@ class InterfaceSolver(ABC):
         saved.restore_bonds(self.fronts)
         self.system.restore(saved.states)
         self.state, self.friction_energy = saved.equilibrium, saved.friction_energy
+        self.overlap_energy = saved.overlap_energy
 
     def _resume(self, state: InterfaceState) -> None:
         """Take a state that the next :meth:`prepare` carries over."""
@@ -196,6 +203,7 @@ class InterfaceSolver(ABC):
         start = time.perf_counter()
         state.carry_over(self.system, self.pairs, self.fronts, self.index)
         self.friction_energy = state.friction_energy
+        self.overlap_energy = state.overlap_energy
         force = state.values(state.equilibrium.force, self.index, self.system.n_retained)
         self.state = self._equilibrium(state, force)
         self.timings.add("growth", start)

@@ -202,7 +202,7 @@ class LinearSolver(InterfaceSolver):
             for _, point in self.system.pieces(last, last.loads, force):
                 more, out, _ = self.along(last, point)
                 work, released = work + more, released + out
-                self.book_friction(last, point)
+                self.book_contact(last, point)
                 last = point
         except (NotPositiveDefinite, ComesApart):
             self.restore_interfaces(saved)
@@ -249,10 +249,15 @@ class LinearSolver(InterfaceSolver):
         work = work_between(here, point, len(self.loads))
         return work, bond_work(here, point), 0.5 * (here.jump + point.jump)
 
-    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
-        """Add the energy friction dissipates along a linear piece."""
-        if self.system.friction is not None:
-            self.friction_energy += self.system.friction.dissipation(self.system, here, point)
+    def book_contact(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Add to their energies what friction and faces that overlap do along a linear piece."""
+        system = self.system
+        if system.friction is not None:
+            self.friction_energy += system.friction.dissipation(system, here, point)
+        closing = system.closing(here, point)
+        if len(closing):
+            mean = 0.5 * (system.pressure(here, closing) + system.pressure(point, closing))
+            self.overlap_energy += float(mean @ (point.jump - here.jump)[closing])
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies, by name; collective."""

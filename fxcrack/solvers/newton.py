@@ -393,7 +393,7 @@ class NewtonSolver(InterfaceSolver):
                 continue
             more, out, _ = self.along(here, end)
             work, energy = work + more, energy + out
-            self.book_friction(here, end)
+            self.book_contact(here, end)
             self.commit()
             done = to
         return energy, work
@@ -414,7 +414,7 @@ class NewtonSolver(InterfaceSolver):
             return 0.0
         here = self.state
         self._solve(force)
-        self.book_friction(here, self.state)
+        self.friction_energy += self._work_of(here, self.state).friction
         return self.along(here, self.state)[0]
 
     # -- back to an accepted state -------------------------------------------------------
@@ -519,9 +519,14 @@ class NewtonSolver(InterfaceSolver):
         work = self._work_of(here, point)
         return work.external_work(len(self.loads)), work.bonds, work.jump
 
-    def book_friction(self, here: Equilibrium, point: Equilibrium) -> None:
-        """Add the energy friction dissipated in the last trial."""
+    def book_contact(self, here: Equilibrium, point: Equilibrium) -> None:
+        """Add to their energies what friction and faces that overlap did in the last trial."""
         self.friction_energy += self._work_of(here, point).friction
+        closing = self.system.closing(here, point)
+        if len(closing) and not self.pairing.pending:
+            # nothing pressed on them before, and the pressure grows as they move apart
+            mean = 0.5 * self.system.pressure(point, closing)
+            self.overlap_energy += float(mean @ (point.jump - here.jump)[closing])
 
     def _work_of(self, here: Equilibrium, point: Equilibrium) -> IncrementWork:
         work = self._last if self._trial is None else self._trial.work

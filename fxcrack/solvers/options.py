@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fxcrack.base.checks import flag, keep, keep_floats, number, positive, whole
 from fxcrack.base.errors import InputError
 
 
@@ -30,8 +31,15 @@ class NewtonOptions:
 
     def __post_init__(self) -> None:
         """Check the numbers."""
-        if not (self.tolerance > 0.0 and self.max_iterations >= 1 and self.balance > 0.0):
+        owner = "NewtonOptions"
+        positive(owner, tolerance=self.tolerance)
+        if not number(owner, "balance", self.balance) > 0.0:
             raise InputError(
-                f"NewtonOptions: tolerance = {self.tolerance}, max_iterations = "
-                f"{self.max_iterations} and balance = {self.balance} must be positive"
+                f"{owner}: balance = {self.balance} must be positive; inf for no bound"
             )
+        keep(
+            self,
+            max_iterations=whole(owner, "max_iterations", self.max_iterations),
+            reuse=flag(owner, "reuse", self.reuse),
+        )
+        keep_floats(self, "tolerance", "balance")

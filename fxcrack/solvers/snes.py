@@ -383,7 +383,7 @@ def solve(problem: InterfaceSnes, y: PETSc.Vec) -> int:
 def _found(problem: InterfaceSnes, iterations: int, reason: int) -> int:
     """Number of iterations, if SNES' reason to end is a good one."""
     if reason <= 0:
-        words, norm = REASONS.get(reason, f"SNES reason {reason}"), problem.norms[-1]
+        words, norm = REASONS.get(reason, f"SNES reason {reason}"), (problem.norms or [np.inf])[-1]
         raise ConvergenceError(
             f"nonlinear solve: {words} (iteration {iterations}, residual {norm:.2e} beside forces "
             f"of {problem.scale:.2e}); take smaller increments (maximum=, minimum=)"
@@ -432,9 +432,9 @@ def _drive(problem: InterfaceSnes, y: PETSc.Vec) -> tuple[int, int]:
             ) from problem.error
         raise problem.error or error from error
     finally:
-        snes.destroy()
-        operator.destroy()
-        work.destroy()
+        # All of them: on several ranks what is left to Python would keep the problem for ever.
+        for thing in (pc, ksp, snes, operator, work):
+            thing.destroy()
 
 
 __all__ = ["Counts", "InterfaceSnes", "solve"]

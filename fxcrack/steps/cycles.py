@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import between, finite, keep, keep_floats, number, numbers
 from fxcrack.base.errors import InputError
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Time, Until, conditions
@@ -73,17 +74,23 @@ class Cycles:
                 "Cycles: give maximum and minimum, or maximum and ratio, or period, and nothing "
                 "beside"
             )
-        numbers = [x for x in (self.maximum, self.minimum, self.ratio) if x is not None]
-        if not np.all(np.isfinite([*numbers, *(self.period or ())])):
-            raise InputError("Cycles: times and ratio must be finite numbers")
+        for name in ("maximum", "minimum", "ratio"):
+            if getattr(self, name) is not None:
+                finite(
+                    "Cycles: times and ratio must be finite numbers", **{name: getattr(self, name)}
+                )
+        keep_floats(self, "maximum", "minimum", "ratio")
+        if self.period is not None:
+            words = "first and last time of a turn"
+            keep(self, period=numbers("Cycles", "period", self.period, 2, words=words))
         if self.ratio is not None and self.ratio >= 1.0:
             raise InputError(f"Cycles: ratio = {self.ratio} must be below 1")
         if self.period is not None and self.period[0] >= self.period[1]:
             raise InputError(f"Cycles: period = {self.period} must end after it begins")
-        if not self.n_max > 0.0:
+        if not number("Cycles", "n_max", self.n_max) > 0.0:
             raise InputError(f"Cycles: n_max = {self.n_max} must be positive")
-        if not 0.0 < self.change < 1.0:
-            raise InputError(f"Cycles: change = {self.change} must lie between 0 and 1")
+        between("Cycles", "change", self.change, 0.0, 1.0, ends=False)
+        keep_floats(self, "n_max", "change")
         if any(isinstance(end, Time) for end in self.ends):
             raise InputError(
                 "Cycles: time stands still while cycles are counted; end with n_max, CrackLength "
@@ -93,7 +100,7 @@ class Cycles:
     @property
     def ends(self) -> tuple[Until, ...]:
         """End conditions as a tuple."""
-        return conditions("Cycles", self.until)
+        return conditions("Cycles", self.until, may_be_empty=True)
 
     def corners(
         self,

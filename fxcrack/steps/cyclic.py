@@ -13,6 +13,7 @@ next release is then a closed form (:func:`fxcrack.criteria.cycle_jump`), over a
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -34,6 +35,7 @@ from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import TipCycle
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.driver import StepDriver
+from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.load_path import LoadPath
 from fxcrack.steps.release import release_tips
 from fxcrack.steps.rows import load_columns
@@ -67,7 +69,9 @@ def run_cycles(analysis: Analysis, step: Cycles, **controls: Any) -> str:
         InputError: An amplitude is not cyclic, or no load changes.
     """
     cycling = _Cycling(analysis, step)
-    driver = StepDriver(analysis, Static(until=step.until), columns=cycling.columns, **controls)
+    # cycles may end by their number alone: no count of releases is reached then
+    until = step.ends or (Releases(sys.maxsize),)
+    driver = StepDriver(analysis, Static(until=until), columns=cycling.columns, **controls)
     return driver.run(cycling.step)
 
 

@@ -8,7 +8,15 @@ from dataclasses import dataclass, field
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import missing_members, number
+from fxcrack.base.checks import (
+    check_instance,
+    keep,
+    list_of,
+    missing_members,
+    number,
+    number_or_function,
+    shown,
+)
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion, ReleaseLaw, StepRelease, release_laws
 from fxcrack.interface.pairing import Interface, Pair
@@ -23,7 +31,7 @@ class Debond:
         criterion: When.
         release: How the bond force goes to zero.
         temperature: Temperature of the interface, a number or a function of positions of shape
-            (n, gdim), for toughness, strength or critical opening tabulated against it.
+            (3, n), for toughness, strength or critical opening tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.
     """
 
@@ -35,13 +43,21 @@ class Debond:
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""
+        example = "Interface('upper_face', 'lower_face', bonded=...)"
+        check_instance("Debond", "interface", self.interface, Interface, example)
         where = f"interface '{self.interface.title}'"
+        watch = list_of(self.watch)
+        if watch is None:
+            raise InputError(f"{where}: watch must be a list of criteria; write watch=[...]")
+        keep(self, watch=tuple(watch))
+        if self.temperature is not None:
+            number_or_function(f"Debond of {where}", "temperature", self.temperature)
         for criterion in (self.criterion, *self.watch):
             check_criterion(where, criterion)
         missing = missing_members(self.release, ReleaseLaw)
         if missing:
             raise InputError(
-                f"{where}: release = {self.release!r} is no release law ({missing}); give "
+                f"{where}: release = {shown(self.release)} is no release law ({missing}); give "
                 "StepRelease(), ProgressiveRelease(), RampRelease(), AmplitudeRelease(...) or a "
                 "class derived from ReleaseLaw"
             )

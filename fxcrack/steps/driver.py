@@ -107,8 +107,29 @@ class StepDriver:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
         self.record("end")
+        reason += self._overflow()
         timings.add("growth", start + _seconds_of_factorisations(timings) - factored)
         return reason
+
+    def _overflow(self) -> str:
+        """Words for the reason where energies of the last row are no finite numbers, and a warning.
+
+        Energies are sums of squares: they overflow first.
+        """
+        row = self.analysis.history[-1]
+        lost = [
+            name
+            for name in ("strain_energy", "external_work", "released_energy")
+            if not np.isfinite(float(row.get(name, 0.0)))
+        ]
+        if not lost:
+            return ""
+        words = (
+            f"; but numbers overflow ({', '.join(lost)} of the last row), so no result holds: "
+            "state loads, moduli and times of a size that is physical in your units"
+        )
+        log.warn("the step ended%s", words)
+        return words
 
     def _apply_loads(self) -> None:
         """Apply loads that are there from the first moment of the step, in proportion."""

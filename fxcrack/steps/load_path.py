@@ -28,7 +28,8 @@ class LoadPath(Protocol):
             upward: Whether f is expected to rise to 1, or to fall to it.
 
         Returns:
-            Whether it crossed 1. The tip values are those of the state reached.
+            Whether it crossed 1. The tip values are those of the state reached: f is 1 there, but
+            for a state reached through unstable ones, at which f has jumped over 1.
         """
 
     def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
@@ -106,7 +107,7 @@ class LinearLoadPath:
                 analysis.advance(point, times[1])
                 analysis.evaluate_tips()
                 self._record("snap")
-                if upward and analysis.largest >= 1.0:
+                if (analysis.largest >= 1.0) == upward:
                     return True
                 continue
             hit = crossing(analysis, values, (here, point), times, upward=upward)

@@ -2,7 +2,9 @@
 
 Every accepted state is an equilibrium. The next one is sought where the tangent gives f = 1 (for
 linear bodies exactly there). If f is below 1 it is a step on the way; if above, it is undone and
-the secant through both ends gives the next guess.
+the secant through both ends gives the next guess. Guesses never fall far behind halving
+(:class:`fxcrack.base.roots.Bracket`), so that the number of trials is bounded also where f jumps
+over 1: softening bonds that run through unstable states.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from collections.abc import Callable, Iterator
 
 from fxcrack.base import log
 from fxcrack.base.errors import ConvergenceError, InputError
+from fxcrack.base.roots import Bracket
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.increment_work import FINE, EnergyImbalance
@@ -26,7 +29,11 @@ _AT_ONE = 1e-9
 _NEAR_ONE = 1e-7
 """How near to 1 the iteration's own tolerance may leave f, where it no longer comes nearer."""
 _MANY = 30
-"""Iterations in which f = 1, or the controlled opening, must be found."""
+"""Increments of no length after which f is said to stay where it is."""
+_MOST = 60
+"""Trials in which the controlled opening must be found; halving to round-off needs 53."""
+_RESOLVED = 1e-13
+"""Part of the time below which a bracket is not divided: f jumps over 1 there."""
 _NO_PROGRESS = 4e-16
 """Increments below this part of the time are round-off."""
 _SMALLEST = 1e-6
@@ -71,21 +78,28 @@ class NewtonLoadPath:
         whole = abs(target - self._analysis.time)
         size = self._maximum
         beyond: tuple[float, float] | None = None
-        idle, strict = 0, True
+        bracket: Bracket | None = None
+        accepted, idle, strict = 0, 0, True  # increments accepted since the last cutback
         while True:
             if self._renew():
-                beyond = None  # with other pairs f was another one there
+                beyond = bracket = None  # with other pairs f was another one there
             begin = self._analysis.time
             way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
             guess = self._predicted(begin + way, upward=upward)
+            jumps = False
             if beyond is not None:
-                guess = self._secant(beyond, guess)
+                bracket = bracket or Bracket(begin, beyond[0])
+                guess = bracket.admit(self._secant(beyond, guess), begin, beyond[0])
                 guess = begin + min(max(guess - begin, -size), size)
+                jumps = abs(beyond[0] - begin) <= _RESOLVED * max(abs(begin), abs(beyond[0]))
+                if jumps:
+                    guess, strict = beyond[0], False
             try:
                 point, values = self._try(guess, strict=strict)
                 level = largest(values)
                 off = level - 1.0 if upward else 1.0 - level
                 crossed = off > _AT_ONE and abs(guess - begin) > _SMALLEST * _AT_ONE * whole
+                crossed = crossed and not jumps
                 if crossed and not self._reversible:
                     self._solver.revert()
                     beyond = (guess, level)
@@ -93,12 +107,12 @@ class NewtonLoadPath:
                 if not self._solver.exact:
                     self._solver.confirm(strict=strict)
             except EnergyImbalance as error:
-                size = 0.5 * abs(guess - begin)
+                size, accepted = 0.5 * abs(guess - begin), 0
                 strict = size > FINE * whole
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
             except ConvergenceError as error:
-                size = 0.25 * abs(guess - begin)
+                size, accepted = 0.25 * abs(guess - begin), 0
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
                 log.info("cut back to an increment of %g: %s", size, error)
@@ -111,17 +125,30 @@ class NewtonLoadPath:
                 self._back_to_one((begin, before))
                 return True
             if off >= -_AT_ONE:
+                if jumps and off > _AT_ONE:
+                    self._report_jump(before, level, bracket)
                 return True
             if guess == target:
                 return False
             idle = idle + 1 if abs(guess - begin) <= _NO_PROGRESS * abs(begin) else 0
-            if idle:
-                beyond = None
+            if idle or jumps:
+                beyond = bracket = None
             if idle > _MANY:
                 raise TooManyCutbacks(f"f stays at {level:.9g} where it should reach 1")
-            if beyond is None:
+            accepted += 1
+            if beyond is None or accepted > 1:
                 size = min(2.0 * size, self._maximum)
+            if beyond is None:
                 self._record("increment")
+
+    def _report_jump(self, before: float, level: float, bracket: Bracket | None) -> None:
+        """Say that f has no value of 1: it jumps, where bonds run through unstable states."""
+        trials = 0 if bracket is None else bracket.trials
+        log.info(
+            "f jumps from %.6g to %.6g at time %.9g, found in %d trials",
+            before, level, self._analysis.time, trials,
+        )  # fmt: skip
+        self._record("snap")
 
     @property
     def _reversible(self) -> bool:
@@ -149,14 +176,18 @@ class NewtonLoadPath:
         Raises:
             TooManyCutbacks: No equilibrium was found.
         """
-        for _ in range(_MANY):
-            level = self._analysis.largest
+        bracket = Bracket(self._analysis.time, other[0])
+        while True:
+            begin, level = self._analysis.time, self._analysis.largest
             if abs(level - 1.0) <= _AT_ONE:
                 return
-            guess = self._predicted(other[0], upward=other[0] > self._analysis.time)
+            guess = self._predicted(other[0], upward=other[0] > begin)
             if guess == other[0]:
                 guess = self._secant(other, guess)
-            begin = (self._analysis.time, level)
+            guess = bracket.admit(guess, begin, other[0])
+            if abs(other[0] - begin) <= _RESOLVED * max(abs(begin), abs(other[0])):
+                log.info("f comes no nearer to 1 than %.9g in %d trials", level, bracket.trials)
+                return
             try:
                 point, values = self._try(guess)
                 if not self._solver.exact:
@@ -168,7 +199,7 @@ class NewtonLoadPath:
             self._solver.commit()
             after = largest(values)
             if (level - 1.0) * (after - 1.0) < 0.0:
-                other = begin
+                other = (begin, level)
             if abs(after - 1.0) < _NEAR_ONE and abs(after - 1.0) > 0.5 * abs(level - 1.0):
                 return  # nearer than the iteration can resolve
 
@@ -178,15 +209,24 @@ class NewtonLoadPath:
         Raises:
             TooManyCutbacks: No equilibrium was found.
         """
-        whole, size, back = self._analysis.time, self._maximum, self._analysis.time
-        for _ in range(_MANY + int(min(whole / size, 1e4))):
+        whole, size = self._analysis.time, self._maximum
+        above, below = whole, None  # times at which the quantity is positive and negative
+        bracket: Bracket | None = None
+        for _ in range(_MOST + int(min(whole / size, 1e4))):
             begin, value = self._analysis.time, excess(self._solver.state)
             self._analysis.evaluate_tips()
             if abs(value) <= tolerance:
                 return True
             if value > 0.0 and begin <= 0.0:
                 return False
-            guess = self._zero(excess, value, max(begin - size, 0.0) if value > 0.0 else back)
+            if value > 0.0:
+                above, end = begin, max(begin - size, 0.0)
+            else:
+                below, end = begin, above
+            guess = self._zero(excess, value, end)
+            if below is not None:
+                bracket = bracket or Bracket(below, above)
+                guess = bracket.admit(guess, below, above)
             try:
                 point = self._move(guess)
             except ConvergenceError as error:
@@ -196,8 +236,6 @@ class NewtonLoadPath:
                 continue
             self._analysis.advance(point, guess)
             self._solver.commit()
-            if value > 0.0:
-                back = begin
         raise TooManyCutbacks("the load at the controlled opening is not found")
 
     def _predictions(self, target: float) -> Iterator[tuple[float, Equilibrium]]:

@@ -27,6 +27,8 @@ _NEVER = (
 )
 _BELOW, _ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
 """Values of f between these count as 1."""
+_AT_ONE = 1e-6
+"""How far from 1 a search for f = 1 may end, that of nonlinear bodies included."""
 
 
 def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
@@ -113,6 +115,8 @@ def step_along_path(driver: StepDriver) -> str:
                 )
         elif analysis.largest < _BELOW and not _load_to_event(driver):
             return driver.ended() or _never(driver)
+        if abs(analysis.largest - 1.0) > _AT_ONE:
+            continue  # f jumped over 1 where bonds ran through unstable states, or the end came
         driver.record("onset")
         release_critical(analysis)
         driver.record("release")

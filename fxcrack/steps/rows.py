@@ -99,6 +99,11 @@ def history_row(analysis: Analysis, event: str) -> Row:
     if system.friction is not None:
         row["friction_energy"] = solver.friction_energy
     row |= spent
+    if balance.kinetic:
+        row["initial_kinetic_energy"] = balance.kinetic
+    if solver.overlap_energy:
+        row["overlap_energy"] = solver.overlap_energy
+    given = work + balance.kinetic + solver.overlap_energy
     gone = balance.released + solver.friction_energy + sum(spent.values())
-    row["balance"] = work - sum(stored.values()) - gone
+    row["balance"] = given - sum(stored.values()) - gone
     return row

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from fxcrack.base.checks import keep, keep_floats, number, number_or_nan, shown, whole
 from fxcrack.base.errors import InputError
 from fxcrack.steps.end_conditions import Until, conditions
+
+STEPPINGS = ("event", "increment", "path", "opening")
 
 
 @dataclass(frozen=True)
@@ -52,20 +56,30 @@ class Static:
     def __post_init__(self) -> None:
         """Check the end and the controls."""
         conditions(type(self).__name__, self.until)
-        if self.stepping not in ("event", "increment", "path", "opening"):
+        if not isinstance(self.stepping, str) or self.stepping not in STEPPINGS:
             raise InputError(
-                f"stepping = '{self.stepping}': choose event, increment, path or opening"
+                f"stepping = {shown(self.stepping)}: choose event, increment, path or opening"
             )
         if (self.stepping == "opening") != (self.opening is not None):
             raise InputError(
-                f"stepping = '{self.stepping}' with opening = {self.opening!r}: stepping='opening' "
-                "needs the name of a monitor, or of two to subtract; other steppings take none"
+                f"stepping = {shown(self.stepping)} with opening = {shown(self.opening)}: "
+                "stepping='opening' needs the name of a monitor, or of two to subtract; other "
+                "steppings take none"
+            )
+        if not isinstance(self.opening, str | tuple | list | None):
+            raise InputError(
+                f"opening = {shown(self.opening)}: give the name of one monitor, or a pair of names"
             )
         names = self.monitors
-        if not all(isinstance(n, str) for n in names) or len(names) > 2:
+        wrong = not all(isinstance(n, str) and n for n in names) or len(names) > 2
+        if wrong or (self.opening is not None and not names):
             raise InputError(
-                f"opening = {self.opening!r}: give the name of one monitor, or a pair of names"
+                f"opening = {shown(self.opening)}: give the name of one monitor, or a pair of names"
             )
+        owner = type(self).__name__
+        for name in ("initial", "minimum", "maximum", "growth", "cutback"):
+            # NaN satisfies none of the inequalities below, which say what is allowed
+            keep(self, **{name: number_or_nan(owner, name, getattr(self, name))})
         if self.initial == Static.initial and 0.0 < self.maximum < self.initial:
             object.__setattr__(self, "initial", self.maximum)
         if not 0.0 < self.minimum <= self.initial <= self.maximum:
@@ -73,11 +87,20 @@ class Static:
                 f"increments must satisfy 0 < minimum <= initial <= maximum, "
                 f"not {self.minimum}, {self.initial}, {self.maximum}"
             )
-        if not (self.growth >= 1.0 and 0.0 < self.cutback < 1.0 and self.max_cutbacks >= 0):
-            raise InputError("growth must be >= 1, cutback between 0 and 1, max_cutbacks >= 0")
-        if not self.max_increments >= 1:
-            raise InputError(f"max_increments = {self.max_increments}: allow at least one")
-        if self.linear_scaling is not None and not 0.0 < self.linear_scaling < 1.0:
+        cutbacks = whole(owner, "max_cutbacks", self.max_cutbacks, least=0)
+        if not (self.growth >= 1.0 and 0.0 < self.cutback < 1.0):
+            raise InputError(
+                f"growth = {self.growth}, cutback = {self.cutback}: growth must be >= 1, cutback "
+                "between 0 and 1, max_cutbacks >= 0"
+            )
+        if not math.isfinite(self.growth):
+            raise InputError(f"{owner}: growth = {self.growth} must be finite")
+        words = "allow at least one"
+        increments = whole(owner, "max_increments", self.max_increments, words=words)
+        keep(self, max_cutbacks=cutbacks, max_increments=increments)
+        if self.linear_scaling is not None and not (
+            0.0 < number(owner, "linear_scaling", self.linear_scaling) < 1.0
+        ):
             raise InputError(
                 f"linear_scaling = {self.linear_scaling} must lie between 0 and 1; 0.9 is usual"
             )
@@ -111,9 +134,10 @@ class Dynamic(Static):
 
     def __post_init__(self) -> None:
         """Let the increments be the time step."""
-        if not 0.0 < self.dt < float("inf"):
+        if not 0.0 < number_or_nan("Dynamic", "dt", self.dt) < float("inf"):
             raise InputError(f"Dynamic: dt = {self.dt} must be a positive time")
-        for name, value in (("initial", self.dt), ("maximum", self.dt)):
-            object.__setattr__(self, name, value)
+        keep_floats(self, "dt")
+        keep(self, initial=self.dt, maximum=self.dt)
+        number("Dynamic", "minimum", self.minimum)
         object.__setattr__(self, "minimum", min(self.minimum, 1e-6 * self.dt))
         super().__post_init__()

@@ -1,0 +1,111 @@
+"""Continuum shells: thin hexahedra with displacements alone and a laminate across them.
+
+User input; :mod:`fxcrack.continuum.shell_cells` puts it on the cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.laminate import Laminate, Ply
+from fxcrack.continuum.materials import Material
+
+Axis = tuple[float, float, float] | Callable[[Array], Array]
+"""A global direction, or a function of positions, shape (3, n) to directions of that shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuumShell:
+    """Material of thin hexahedra of second order, one or more across the thickness.
+
+    The cells are integrated so that they may be thin and curved without locking
+    (:mod:`fxcrack.continuum.reduced_integration`), for small strain and for
+    :class:`fxcrack.FiniteStrain`. Any number of plies may lie in one cell: the stiffness over the
+    thickness is the polynomial with the moments of the plies. The faces of the cells are ordinary
+    faces: interfaces, loads and supports take them by name. Displacements are of second order
+    (27 nodes); a mesh of first order needs ``Scene(order=2)``.
+
+    Args:
+        section: A laminate over the whole thickness, or one material.
+        bottom: Facet group below the cells, where the first ply is.
+        top: Facet group above the cells.
+        axis: Direction from which the angles of the plies are measured: a vector or a function of
+            position, projected into the plane of the cell. Needed unless every ply is isotropic
+            in its plane.
+        shear_factors: Factors (k13, k23) of the transverse shear moduli; those of equilibrium
+            by default where there is one cell across the thickness
+            (:meth:`fxcrack.Laminate.shear_factors`), 1 where there are more.
+
+    Raises:
+        InputError: An argument is of the wrong kind, or an axis is missing.
+    """
+
+    section: Laminate | Material
+    bottom: str
+    top: str
+    axis: Axis | None = None
+    shear_factors: tuple[float, float] | None = None
+
+    def __post_init__(self) -> None:
+        """Check the arguments."""
+        laminate = self.laminate
+        for name in ("bottom", "top"):
+            if not isinstance(getattr(self, name), str):
+                raise InputError(
+                    f"ContinuumShell: {name} = {getattr(self, name)!r} must be the name of a group "
+                    "of faces"
+                )
+        if self.bottom == self.top:
+            raise InputError(
+                f"ContinuumShell: bottom and top are both '{self.bottom}'; name the faces on "
+                "either side of the cells"
+            )
+        if self.axis is None and not laminate.is_isotropic_in_plane:
+            raise InputError(
+                "ContinuumShell: angles of plies need the direction they are measured from; give "
+                "e.g. axis=(1, 0, 0)"
+            )
+        if self.axis is not None and not callable(self.axis):
+            axis = np.asarray(self.axis)
+            if axis.shape != (3,) or axis.dtype.kind not in "fiu" or not np.all(np.isfinite(axis)):
+                raise InputError(f"ContinuumShell: axis = {self.axis!r} must be three numbers")
+            if not axis.any():
+                raise InputError("ContinuumShell: axis = (0, 0, 0) has no direction")
+        if self.shear_factors is not None:
+            k = np.asarray(self.shear_factors)
+            if k.shape != (2,) or k.dtype.kind not in "fiu" or not np.all((k > 0.0) & (k <= 1.0)):
+                raise InputError(
+                    f"ContinuumShell: shear_factors = {self.shear_factors!r} must be two numbers "
+                    "(k13, k23), above 0 and at most 1"
+                )
+
+    @property
+    def laminate(self) -> Laminate:
+        """The section as a laminate; its thickness is 1 for a section of one material."""
+        if isinstance(self.section, Laminate):
+            return self.section
+        return Laminate([Ply(1.0)], material=self.section)
+
+    @property
+    def density(self) -> float | None:
+        """Mass per volume; ``None`` where a ply has none."""
+        return self.laminate.density
+
+    def stiffness(self) -> Array:
+        """Refuse: the stiffness, shape (6, 6), is that of a place in a cell.
+
+        Raises:
+            InputError: Always: something treats the cells as those of a solid material.
+        """
+        raise InputError(
+            "ContinuumShell: this analysis knows solid materials only; give the laminate itself "
+            "as the material (the homogeneous body), or cells for each ply (laminate.layers)"
+        )
+
+
+__all__ = ["ContinuumShell"]

@@ -1,0 +1,104 @@
+"""The check of the energy balance that every step ends with.
+
+    work + energy there before any load = stored + released + dissipated + balance
+
+The column "balance" is what is left over: an error of the run, whatever its cause. It is compared
+with the largest energy of the history, since errors add up over all of it. Energy that the time
+integration has made (a negative "numerical_dissipation") is warned of by the end of a step only:
+generalised alpha does not let a motion lose energy at every instant, but over some increments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fxcrack.base import log
+from fxcrack.base.errors import EnergyError
+from fxcrack.history import History, Row
+
+WARNED = 1e-3
+"""Part of the largest energy beyond which a step warns of its balance. Beside round-off, increments
+that are too long leave less: those of nonlinear bodies are divided at 1e-5 of the stored energy
+each (:class:`~fxcrack.solvers.options.NewtonOptions`), and friction in 3-D, plastic strain and the
+motion of bodies at finite strain are integrated to about 1e-4 to 1e-3."""
+REFUSED = 1e-2
+"""Part beyond which a step ends with an error."""
+_ROUND_OFF = 1e-6
+"""Energies below this part of the products of loads and their conjugates are differences of large
+numbers (a body that expands freely stores nothing), and no measure for what is missing."""
+_STORED = ("strain_energy", "kinetic_energy")
+_GIVEN = ("external_work", "initial_kinetic_energy", "overlap_energy")
+_ADVICE = (
+    "the increments are too long for the contact, friction or finite strain of the scene (give "
+    "maximum=, minimum= or dt=), or the run has left the equilibrium path"
+)
+
+
+def check_energy(history: History, first: int) -> None:
+    """Warn of, or refuse, a step whose energies do not balance; collective.
+
+    Args:
+        history: All rows so far; they are kept.
+        first: Number of the first row of the step.
+
+    Raises:
+        EnergyError: More than :data:`REFUSED` of the largest energy is missing.
+    """
+    comm = history.comm
+    part, made, time = comm.bcast(_errors(history.rows, first) if comm.rank == 0 else None)
+    if part > REFUSED:
+        raise EnergyError(
+            f"the energy balance of the step is off by {part:.2g} of the largest energy at time "
+            f"{time:g}, more than {REFUSED:.0%}, so the results are wrong from there on or before: "
+            f"{_ADVICE}. They are kept: scene.history",
+            part,
+        )
+    if part > WARNED:
+        log.warn(
+            "the energy balance of the step is off by %.2g of the largest energy at time %g: %s",
+            part, time, _ADVICE,
+        )  # fmt: skip
+    if made > REFUSED:
+        log.warn(
+            "the time integration has made energy, %.2g of the largest one, by the end of the "
+            "step: take smaller increments (dt=), or rho_inf=1, which makes none",
+            made,
+        )
+
+
+def _errors(rows: Sequence[Row], first: int) -> tuple[float, float, float]:
+    """Errors of some rows in parts of the largest energy.
+
+    Returns:
+        The largest imbalance, infinite if one is not a number; the energy that time integration
+        has made in the end; the time of the imbalance.
+    """
+    size = max((max(_energy(r), _ROUND_OFF * _products(r)) for r in rows), default=0.0)
+    if not size > 0.0 or first >= len(rows):
+        return 0.0, 0.0, 0.0
+    parts = np.array([abs(float(r["balance"])) / size for r in rows[first:]])
+    parts[np.isnan(parts)] = np.inf
+    i = int(np.argmax(parts))
+    made = -float(rows[-1].get("numerical_dissipation", 0.0)) / size
+    return float(parts[i]), made, float(rows[first + i]["time"])
+
+
+def _energy(row: Row) -> float:
+    """Largest of the energies given to the bodies and stored in them."""
+    stored = sum(float(row.get(name, 0.0)) for name in _STORED)
+    return max(abs(stored), *(abs(float(row.get(name, 0.0))) for name in _GIVEN))
+
+
+def _products(row: Row) -> float:
+    """Sum of loads times their conjugates."""
+    out = 0.0
+    for name, value in row.items():
+        other = {"u": "R", "F": "v"}.get(name[:1])
+        if other is not None and name[1:2] == "[" and other + name[1:] in row:
+            out += abs(float(value) * float(row[other + name[1:]]))
+    return out
+
+
+__all__ = ["REFUSED", "WARNED", "check_energy"]
