@@ -415,6 +415,91 @@ def test_a_deck_and_the_scene_in_python_give_the_same_history(shared_path):
         assert history[name] == pytest.approx(other[name], rel=1e-8, abs=1e-8)
 
 
+ARMS = """*Heading
+** Job name: dcb Model name: Model-1
+*Preprint, echo=NO, model=NO, history=NO, contact=NO
+**
+*Part, name=Arm
+*Node
+      1,           0.,           0.
+     41,         100.,           0.
+    101,           0.,          1.5
+    141,         100.,          1.5
+*Ngen, nset=Low
+1, 41
+*Ngen, nset=High
+101, 141
+*Element, type=CPE4I
+1, 1, 2, 102, 101
+*Elgen, elset=Arm
+1, 40, 1, 1
+*Nset, nset=Pin
+ 101,
+*Elset, elset=_Face_S1, internal, generate
+  1,  40,   1
+*Surface, type=ELEMENT, name=Face
+_Face_S1, S1
+** Section: Section-1
+*Solid Section, elset=Arm, material=Ply
+25.,
+*End Part
+**
+*Assembly, name=Assembly
+*Instance, name=Upper-1, part=Arm
+*End Instance
+*Instance, name=Lower-1, part=Arm
+          0.,           0.,           0.
+          0.,           0.,           0.,           1.,           0.,           0.,         180.
+*End Instance
+*Nset, nset=Bond, instance=Upper-1, generate
+ 13,  41,   1
+*End Assembly
+*Material, name=Ply
+*Elastic, type=ENGINEERING CONSTANTS
+139400.,10160.,10160.,   0.3,   0.3, 0.436, 4600., 4600.
+3540.,
+*Surface Interaction, name=Prop
+25.,
+*Contact Pair, interaction=Prop, small sliding, type=SURFACE TO SURFACE, adjust=0.0
+Upper-1.Face, Lower-1.Face
+*Initial Conditions, type=CONTACT
+Upper-1.Face, Lower-1.Face, Bond
+** ----------------------------------------------------------------
+*Step, name=Open, nlgeom=NO, inc=2000
+*Static
+0.05, 1., 1e-07, 0.05
+*Boundary
+Upper-1.Pin, 1, 1
+Upper-1.Pin, 2, 2, 1.
+Lower-1.Pin, 1, 1
+Lower-1.Pin, 2, 2, -1.
+*Debond, slave=Upper-1.Face, master=Lower-1.Face, frequency=1
+*Fracture Criterion, type=VCCT, mixed mode behavior=BK, tolerance=0.05
+0.1703, 0.494, 0.494, 1.62
+*Controls, type=VCCT LINEAR SCALING
+0.9,
+*Restart, write, frequency=0
+*Output, history
+*Contact Output, slave=Upper-1.Face, master=Lower-1.Face
+DBT, BDSTAT, ENRRT, EFENRRTR
+*End Step
+"""
+"""One part, of which the second instance is turned about the crack, as preprocessors write it."""
+
+
+def test_two_instances_of_one_part_give_the_same_history(tmp_path):
+    deck = fx.read_deck(write(tmp_path, ARMS))
+    by_hand, step = demo.same_in_python(40, 1)
+    history, other = deck.run(), by_hand.run(step)
+    assert len(history) == len(other) and history.rows[-1]["released[Upper-1.Face]"] > 0
+    for name in ("a", "f", "GI", "area"):
+        mine, its = history[f"{name}[Upper-1.Face]"], other[f"{name}[UPPER]"]
+        assert mine == pytest.approx(its, rel=1e-8, abs=1e-8)
+    assert history["R[Upper-1.Pin.y]"] == pytest.approx(other["R[pin_top.y]"], rel=1e-8)
+    deck.scene.close()
+    by_hand.close()
+
+
 @pytest.mark.parametrize(
     "text",
     [

@@ -80,6 +80,7 @@ def test_refused_elements_name_file_line_and_remedy(tmp_path):
             "one of the kinematic models",
         ),
         ("*NODE, NSET=ALL", "*NODE, NSET=ALL, SYSTEM=S", "SYSTEM=S is not available"),
+        ("STEEL\n2.0", "STEEL\n-2.0", "the thickness -2 must be positive"),
         ("LAST, S2", "LAST, S5", "has faces 1 to 4, not 5"),
         ("LAST, S2", "LAST, S4", "lies inside; only"),
         ("LAST, S2", "LAST, SPOS", "face SPOS is not available"),
@@ -148,6 +149,11 @@ def test_neighbours_share_the_centre_of_their_face(tmp_path):
     raw = read(tmp_path, text).raw
     assert len(raw.points) == 5 * 3 * 3
     assert len(np.unique(np.round(raw.points, 9), axis=0)) == 45
+
+
+def test_a_card_of_elements_without_any(tmp_path):
+    raw = flat(tmp_path, PLATE.replace("*NSET", "*ELEMENT, TYPE=C3D8\n*NSET", 1))
+    assert raw.cells.shape == (2, 4)
 
 
 # -- generators ------------------------------------------------------------------------------------

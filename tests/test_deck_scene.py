@@ -184,9 +184,24 @@ def test_lines_of_boundary_that_are_refused(tmp_path, line, words):
     refused(tmp_path, PLATE + stepped("*BOUNDARY", line), words)
 
 
-def test_velocities_are_refused(tmp_path):
-    cards = ("*BOUNDARY, TYPE=VELOCITY", "LEFT, 1, 1, 1.")
-    refused(tmp_path, PLATE + stepped(*cards), "TYPE=VELOCITY is not available")
+def test_velocities_are_integrated(tmp_path):
+    text = PLATE + "*BOUNDARY\nLEFT, PINNED\n*AMPLITUDE, NAME=A\n0., 0., 1., 1.\n"
+    text += stepped("*BOUNDARY, TYPE=VELOCITY, AMPLITUDE=A", "RIGHT, 1, 1, 4.")
+    text += stepped("*CLOAD", "6, 2, 0.1", static="1., 2.")
+    track = supports(tmp_path, text)["RIGHT"].amplitude
+    # 4 t^2/2, then the last velocity 4 on and on
+    for t in (0.25, 0.5, 1.0):
+        assert track(t) == pytest.approx(2.0 * t * t, rel=1e-12)
+    assert track(3.0) == pytest.approx(10.0, rel=1e-12)
+    steady = (
+        PLATE
+        + "*BOUNDARY\nLEFT, PINNED\n"
+        + stepped("*BOUNDARY, TYPE=VELOCITY", "RIGHT, 1, 1, 4.", static="1., 2.")
+    )
+    found = supports(tmp_path, steady)["RIGHT"]
+    assert (found.x, found.amplitude) == (4.0, fx.Ramp())
+    bad = steady.replace("TYPE=VELOCITY", "TYPE=ACCELERATION")
+    refused(tmp_path, bad, "TYPE=ACCELERATION is not available")
 
 
 # -- amplitudes ------------------------------------------------------------------------------------

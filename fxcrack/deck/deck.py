@@ -106,11 +106,16 @@ def translated(path: Path, order: int | None = None) -> Translated:
 
 
 def _translated(path: Path, report: Report, order: int | None = None) -> Translated:
-    cards = read_cards(path)
-    report.screen(cards)
-    model = read_model(cards, report)
-    report.check()
-    return translate(model, report, order)
+    try:
+        cards = read_cards(path)
+        report.screen(cards)
+        model = read_model(cards, report)
+        report.check()
+        return translate(model, report, order)
+    except InputError as error:
+        if isinstance(error, DeckError):
+            raise
+        raise DeckError(f"{path.name}: {error}") from error
 
 
 def check_deck(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> Report:

@@ -78,6 +78,8 @@ class Flat:
         for name, space in spaces.items():
             labels, cells = [], []
             for block in space.elements.values():
+                if not len(block.table.labels):
+                    continue
                 nodes = np.asarray(block.table.rows, dtype=np.int64)
                 at = space.nodes.find(nodes)
                 if np.any(at < 0):

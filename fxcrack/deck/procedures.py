@@ -219,7 +219,7 @@ def _visco(asked: _Asked) -> Found:
 def _dynamic(asked: _Asked) -> Found:
     card = asked.card
     if card.has("EXPLICIT"):
-        card.fail("explicit dynamics is not available yet; implicit *DYNAMIC and *STATIC are")
+        return _explicit(asked)
     kinds = ("TRANSIENT FIDELITY", "MODERATE DISSIPATION", "QUASI-STATIC")
     kind = card.choose("APPLICATION", kinds, "TRANSIENT FIDELITY")
     length, sizes = _increments(asked)
@@ -245,6 +245,11 @@ def _dynamic(asked: _Asked) -> Found:
         **asked.controls.options,
     )
     return period, step, Inertia.hht(alpha)
+
+
+def _explicit(asked: _Asked) -> Found:
+    """``*DYNAMIC, EXPLICIT``: second field of the data line is the length of the step."""
+    asked.card.fail("explicit dynamics is not available yet; implicit *DYNAMIC and *STATIC are")
 
 
 def _cyclic(asked: _Asked) -> Found:

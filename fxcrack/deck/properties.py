@@ -13,7 +13,7 @@ from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, Plane
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.materials import Isotropic, Material, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.temperature import ByTemperature
-from fxcrack.deck.cards import Card, Row, key
+from fxcrack.deck.cards import Card, DeckError, Row, key
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.generators import axis_rotation
 from fxcrack.deck.groups import Groups
@@ -139,6 +139,8 @@ class _Sections:
         value = rows[0].number(0, 1.0) if rows else 1.0
         if self._flat.kind.model not in ("plane strain", "plane stress"):
             return 1.0
+        if value <= 0.0:
+            rows[0].fail(f"the thickness {value:g} must be positive")
         return value
 
     def _model(self, thickness: float) -> Model:
@@ -202,22 +204,19 @@ class _Sections:
             if not len(rows):
                 card.fail(f"no face S{face} of the elements lies on the outside of the body")
             sides[side] = self._groups.facets(f"{name} {side}", rows)
-        plies = []
-        angles, thicknesses = [0.0], [1.0]
-        if card.has("COMPOSITE"):
-            rows_of = card.rows()
-            thicknesses = [row.number(0) for row in rows_of]
-            angles = [row.number(3, 0.0, what="the angle of the ply") for row in rows_of]
-        for material, angle, thickness in zip(
-            self._ply_materials(card), angles, thicknesses, strict=True
-        ):
-            made = self._material(self._materials[material], _GLOBAL)
-            plies.append(Ply(thickness, angle, made))
+        made = [self._material(self._materials[m], _GLOBAL) for m in self._ply_materials(card)]
+        section: Laminate | Material = made[0]
         try:
-            section = Laminate(plies) if card.has("COMPOSITE") else plies[0].material
-            assert section is not None
-            return ContinuumShell(section, axis=frame[0], **sides)
+            if card.has("COMPOSITE"):
+                plies = [
+                    Ply(row.number(0), row.number(3, 0.0, what="the angle of the ply"), material)
+                    for row, material in zip(card.rows(), made, strict=True)
+                ]
+                section = Laminate(plies)
+            return ContinuumShell(section, sides["bottom"], sides["top"], axis=frame[0])
         except InputError as error:
+            if isinstance(error, DeckError):
+                raise
             return card.fail(str(error))
 
     # -- materials -----------------------------------------------------------------------

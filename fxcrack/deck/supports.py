@@ -44,6 +44,7 @@ class Entry:
         value: Reference value.
         curve: Amplitude.
         fixed: Whether the present value is kept.
+        rate: Whether the value is a velocity.
     """
 
     card: Card
@@ -51,6 +52,7 @@ class Entry:
     value: float
     curve: Curve | None
     fixed: bool = False
+    rate: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,10 +129,11 @@ class Boundary:
             self._now[:] = -1
         for card in cards:
             kind = card.word("TYPE", "DISPLACEMENT")
-            if kind not in ("DISPLACEMENT", "FORCE"):
-                card.fail(f"TYPE={kind} is not available; prescribe displacements")
-            if kind == "FORCE":
-                card.fail("TYPE=FORCE is not available; give the force by *CLOAD")
+            if kind not in ("DISPLACEMENT", "VELOCITY"):
+                card.fail(
+                    f"TYPE={kind} is not available; DISPLACEMENT and VELOCITY are, and forces by "
+                    "*CLOAD"
+                )
             curve = amplitudes.of(card)
             for row in card.need_rows("node or set, first and last component, value"):
                 self._take_row(row, curve)
@@ -152,7 +155,8 @@ class Boundary:
                 )
             dofs, value = tuple(range(first, last + 1)), row.number(3, 0.0)
         fixed = row.card.has("FIXED")
-        entry = Entry(row.card, label(row.text(0)), value, curve, fixed)
+        rate = row.card.word("TYPE") == "VELOCITY"
+        entry = Entry(row.card, label(row.text(0)), value, curve, fixed, rate)
         self.entries.append(entry)
         for dof in dofs:
             self._now[dof - 1, nodes] = len(self.entries) - 1
@@ -168,7 +172,13 @@ class Boundary:
         track, last = Track(), -1
         for i, period in zip(owners.tolist(), self.periods, strict=True):
             entry = self.entries[i]
-            if entry.fixed or (i == last and not (entry.curve and entry.curve.total)):
+            if entry.rate and not entry.fixed:
+                value, curve = entry.value, entry.curve
+                if i == last and curve is not None and not curve.total:
+                    value = float(curve.values[-1]) * (1.0 if curve.absolute else value)
+                    curve = None
+                track.move_at_rate(period, value, curve)
+            elif entry.fixed or (i == last and not (entry.curve and entry.curve.total)):
                 track.hold(period)
             else:
                 track.move(period, entry.value, entry.curve)

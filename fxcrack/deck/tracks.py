@@ -188,6 +188,25 @@ class Track:
         else:
             self._put(np.array([period.start, period.end]), np.array([value, value]), period)
 
+    def move_at_rate(self, period: Period, rate: float, curve: Curve | None) -> None:
+        """Go over a step at a rate, constant or along a curve: the value is its integral.
+
+        Where the rate changes, the parabola is followed by straight lines.
+        """
+        times, rates = np.array([period.start, period.end]), np.array([rate, rate])
+        if curve is not None:
+            times, rates = curve.over(period)
+            rates = rates if curve.absolute else rate * rates
+        self._made_of.append(None)
+        here = self.values[-1]
+        for i in range(len(times) - 1):
+            length, change = times[i + 1] - times[i], rates[i + 1] - rates[i]
+            n = _SMOOTH if change else 1
+            for s in np.arange(1, n + 1) / n:
+                gone = (rates[i] * s + 0.5 * change * s * s) * length
+                self._append(float(times[i] + s * length), float(here + gone))
+            here = self.values[-1]
+
     def hold(self, period: Period) -> None:
         """Stay over a step as it was at its beginning."""
         self._made_of.append(None)
