@@ -173,6 +173,19 @@ def test_what_a_deck_has_no_word_for(tmp_path, change, words):
     assert not (tmp_path / "a.inp").exists()
 
 
+def test_wrong_arguments(tmp_path):
+    one = scene(dcb_2d(dx=10.0, ny=1))
+    with pytest.raises(fx.InputError, match="write_deck: scene is"):
+        fx.write_deck(None, [INCREMENTS], tmp_path / "a.inp")
+    with pytest.raises(fx.InputError, match="write_deck: steps must be a list"):
+        fx.write_deck(one, INCREMENTS, tmp_path / "a.inp")
+    with pytest.raises(fx.InputError, match="with_usual_names: history is"):
+        fx.with_usual_names(None)
+    for path, order in ((None, None), (tmp_path / "no.inp", None), (tmp_path, 3)):
+        with pytest.raises(fx.InputError):
+            fx.read_deck(path, order=order)
+
+
 @pytest.mark.mpi
 @pytest.mark.three
 def test_the_deck_does_not_depend_on_the_number_of_ranks(comm, shared_path):

@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -77,6 +78,8 @@ def write_deck(scene: Scene, steps: Sequence[Static | Cycles | DeckStep], path: 
         InputError: The scene or a step has something that a deck has no word for.
         FxcrackError: The file could not be written.
     """
+    check_instance("write_deck", "scene", scene, Scene, "deck.scene")
+    steps = check_list("write_deck", "steps", steps, (Static, Cycles, DeckStep))
     mesh = gather(scene.mesh)
     toughness = [_nodal_toughness(d, p) for d, p in zip(scene.debonds, scene.pairs, strict=False)]
     comm, lines, problem = scene.mesh.comm, [], None

@@ -21,6 +21,7 @@ from __future__ import annotations
 
 import re
 
+from fxcrack.base.checks import check_instance
 from fxcrack.base.errors import InputError
 from fxcrack.history import History, Row
 
@@ -58,6 +59,7 @@ def with_usual_names(history: History) -> History:
     Raises:
         InputError: Two columns would have the same name.
     """
+    check_instance("with_usual_names", "history", history, History, "scene.history")
     names = {column: usual_name(column) for column in history.columns}
     if len(set(names.values())) < len(names):
         raise InputError("two columns of the history would have the same usual name")
