@@ -51,10 +51,12 @@ from fxcrack.criteria import (
     Tabulated,
     TipEvaluator,
 )
+from fxcrack.deck.deck import Deck, read_deck
+from fxcrack.deck.write import write_deck
 from fxcrack.effects import FiniteStrain
 from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
-from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
+from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.plies import PlyResults, ply_results
 from fxcrack.output.tables import (
@@ -64,6 +66,7 @@ from fxcrack.output.tables import (
     write_releases,
     write_tip_table,
 )
+from fxcrack.output.usual_names import with_usual_names
 from fxcrack.restart.checkpoint import Checkpoint, checkpoints
 from fxcrack.scene import Debond, Scene
 from fxcrack.solvers.options import NewtonOptions
@@ -126,6 +129,7 @@ __all__ = [
     "CriticalStress",
     "Cycles",
     "Debond",
+    "Deck",
     "Displacement",
     "Dynamic",
     "EnergyError",
@@ -183,10 +187,14 @@ __all__ = [
     "bond_table",
     "checkpoints",
     "displacement_function",
+    "from_dolfinx",
     "mesh_from_gmsh",
     "ply_results",
+    "read_deck",
     "read_mesh",
     "tip_table",
+    "with_usual_names",
+    "write_deck",
     "write_fields",
     "write_releases",
     "write_tip_table",

@@ -1,4 +1,4 @@
-"""Command line: ``fxcrack demo``, ``fxcrack bench``, ``fxcrack accuracy``, ``fxcrack info``.
+"""Command line: ``fxcrack run``, ``demo``, ``bench``, ``cost``, ``accuracy``, ``info``.
 
 The same words run under mpirun: rank 0 prints, and an error ends all ranks. Bad input, found on
 all ranks together, is one short message and exit code 1; wrong words are exit code 2. Any other
@@ -99,6 +99,35 @@ def demo(
         if checkpoint or restart:
             stack.enter_context(checkpoints(folder / "checkpoints", restart=restart, seconds=10.0))
         module.main(folder, fine=fine)
+
+
+# -- decks ---------------------------------------------------------------------------
+
+
+@app.command()
+def run(
+    deck: Annotated[Path, typer.Argument(help="Keyword deck (*.inp).", metavar="DECK")],
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for results.", show_default="out/NAME")
+    ] = None,
+    check: Annotated[
+        bool, typer.Option("--check", help="Only list what is read, replaced, refused.")
+    ] = False,
+    order: Annotated[
+        int | None, typer.Option(help="Order of the displacement [that of the elements].")
+    ] = None,
+    usual_names: Annotated[
+        bool, typer.Option("--usual-names", help="Columns U1, RF1, ENRRT11, ALLSE, ...")
+    ] = False,
+) -> None:
+    """Run a keyword deck, and write its history, fields, bonds and crack tips."""
+    from fxcrack.deck.run import check_only, run_deck
+
+    if check:
+        check_only(deck, rank_0_console())
+        return
+    folder = Path("out") / deck.stem if out is None else out
+    run_deck(deck, folder, rank_0_console(), order=order, usual_names=usual_names)
 
 
 # -- benchmarks ----------------------------------------------------------------------

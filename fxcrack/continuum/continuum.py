@@ -362,11 +362,21 @@ class Continuum:
         """
         group = self.mesh.group(where)
         self.mesh.domain.topology.create_connectivity(group.dim, self.mesh.tdim)
-        nodes = fem.locate_dofs_topological(self.space, group.dim, group.entities)
+        if group.points is not None and self.order == self.mesh.order:
+            nodes = self._nodes_of_points(group.points)
+        else:
+            nodes = fem.locate_dofs_topological(self.space, group.dim, group.entities)
         nodes = np.unique(nodes[nodes < self.layout.n_owned])
         if self.comm.allreduce(len(nodes)) == 0:
             raise InputError(f"group '{where}' of mesh '{self.mesh.name}' holds no node")
         return np.asarray(nodes, dtype=np.int32)
+
+    def _nodes_of_points(self, points: Ints) -> Ints:
+        """Displacement nodes at geometry nodes, for a displacement of the geometry's order."""
+        geometry, space = compat.geometry_dofmap(self.mesh.domain), self.space.dofmap.list
+        of_point = np.full(len(self.mesh.domain.geometry.x), -1, dtype=np.int32)
+        of_point[geometry.ravel()] = np.asarray(space).ravel()
+        return np.asarray(of_point[points])
 
     def positions(self) -> Array:
         """Positions of the local displacement nodes, owned first, shape (n, 3), length."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import numpy as np
 import numpy.typing as npt
@@ -10,7 +12,7 @@ from mpi4py import MPI
 
 from fxcrack.base.errors import MeshError
 from fxcrack.mesh.mesh import Group, Mesh
-from fxcrack.mesh.raw import RawMesh, distinct
+from fxcrack.mesh.raw import RawMesh, distinct, vertices_of
 
 
 def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
@@ -38,7 +40,22 @@ def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
     for dim in sorted(comm.bcast(dims), reverse=True):
         for group, entities in _lower_groups(raw, domain, dim, name).items():
             groups[group] = Group(dim, entities)
+    for group, points in _midside_groups(raw, domain).items():
+        groups[group] = replace(groups[group], points=points)
     return Mesh(domain, groups, name)
+
+
+def _midside_groups(raw: RawMesh | None, domain: Domain) -> dict[str, npt.NDArray[np.int32]]:
+    """Local geometry nodes of the groups of nodes that hold nodes which are no vertices."""
+    comm = compat.plain_comm(domain.comm)
+    chosen: dict[str, npt.NDArray[np.int64]] = {}
+    if raw is not None and raw.order > 1:
+        is_vertex = vertices_of(raw)
+        nodes = {n: g.rows[:, 0] for n, g in raw.groups.items() if g.dim == 0}
+        chosen = {n: np.sort(rows) for n, rows in nodes.items() if not is_vertex[rows].all()}
+    chosen = comm.bcast(chosen)
+    given = domain.geometry.input_global_indices
+    return {n: np.flatnonzero(np.isin(given, rows)).astype(np.int32) for n, rows in chosen.items()}
 
 
 def _cell_groups(raw: RawMesh | None, domain: Domain) -> dict[str, npt.NDArray[np.int32]]:
@@ -68,6 +85,9 @@ def _lower_groups(
     width = None
     if raw is not None:
         chosen = {n: g.rows for n, g in raw.groups.items() if g.dim == dim}
+        if dim == 0 and raw.order > 1:  # midside nodes are no entities: _midside_groups
+            is_vertex = vertices_of(raw)
+            chosen = {n: rows[is_vertex[rows[:, 0]]] for n, rows in chosen.items()}
         names = list(chosen)
         rows = np.concatenate(list(chosen.values()))
         numbers = np.repeat(

@@ -70,6 +70,51 @@ def mesh_from_domain(
     return Mesh(domain, found, name)
 
 
+def from_dolfinx(
+    domain: dolfinx.mesh.Mesh,
+    cell_tags: dolfinx.mesh.MeshTags | None = None,
+    facet_tags: dolfinx.mesh.MeshTags | None = None,
+    names: Mapping[str, tuple[int, int]] | None = None,
+    *,
+    name: str = "mesh",
+) -> Mesh:
+    """A DOLFINx mesh whose tagged cells and facets become named groups; collective.
+
+    Args:
+        domain: The mesh. Make it with ghost mode ``shared_facet`` where facets inside it count.
+        cell_tags: Tags of cells.
+        facet_tags: Tags of facets.
+        names: Dimension and tag of each named group, as ``physical_groups`` of DOLFINx' gmsh
+            reader; tags without a name are called ``group_<dimension>_<tag>``.
+        name: What messages and files call the mesh.
+
+    Raises:
+        MeshError: A name belongs to no tag, or as :func:`mesh_from_domain`.
+
+    Example:
+        ``from_dolfinx(domain, facet_tags=tags, names={"left": (1, 3), "right": (1, 4)})``
+    """
+    comm = compat.plain_comm(domain.comm)
+    tdim = domain.topology.dim
+    tags = {tdim: cell_tags, tdim - 1: facet_tags}
+    found: dict[tuple[int, int], npt.NDArray[np.int32]] = {}
+    for dim, marks in tags.items():
+        values = np.zeros(0, np.int32) if marks is None else np.asarray(marks.values)
+        for tag in sorted(set().union(*comm.allgather(set(values.tolist())))):
+            found[dim, tag] = np.asarray(marks.indices)[values == tag] if marks else values[:0]
+    titles = {}
+    for title, (dim, tag) in (names or {}).items():
+        if (dim, tag) not in found:
+            known = ", ".join(map(str, found)) or "none"
+            raise MeshError(
+                f"mesh '{name}': '{title}' means tag {tag} of dimension {dim}, but there is none; "
+                f"known (dimension, tag): {known}"
+            )
+        titles[dim, tag] = title
+    groups = {titles.get(key, f"group_{key[0]}_{key[1]}"): (key[0], e) for key, e in found.items()}
+    return mesh_from_domain(domain, groups, name=name)
+
+
 def _marked(
     comm: MPI.Intracomm, domain: dolfinx.mesh.Mesh, dim: int, name: str, key: str, marker: Marker
 ) -> npt.NDArray[np.int32]:

@@ -17,7 +17,7 @@ from fxcrack.base.arrays import Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import MeshError
 from fxcrack.mesh.complete import INCOMPLETE, Completion
-from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct
+from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct, vertices_of
 
 _CELLS = {
     2: ("triangle", 1),
@@ -142,7 +142,7 @@ def _names(model: Any, tdim: int) -> dict[str, tuple[int, int]]:
     """Name, dimension and tag of every physical group, cells first."""
     found: dict[str, tuple[int, int]] = {}
     for dim, tag in sorted(model.getPhysicalGroups(), key=lambda group: (-group[0], group[1])):
-        name = model.getPhysicalName(dim, tag) or f"group_{dim}_{tag}"
+        name = model.getPhysicalName(dim, tag).strip() or f"group_{dim}_{tag}"
         if name in found:
             raise MeshError(
                 f"the name '{name}' is used for physical groups of dimension {found[name][0]} and "
@@ -172,8 +172,7 @@ def _check_nodes(raw: RawMesh) -> None:
     """Refuse a node group with a midside node: DOLFINx has only vertices as points."""
     if raw.order == 1:
         return
-    is_vertex = np.zeros(len(raw.points), dtype=bool)
-    is_vertex[raw.cells[:, : raw.n_vertices(raw.tdim)]] = True
+    is_vertex = vertices_of(raw)
     for name, group in raw.groups.items():
         midside = group.rows[~is_vertex[group.rows[:, 0]], 0] if group.dim == 0 else []
         if len(midside):

@@ -20,10 +20,14 @@ class Group:
     Attributes:
         dim: Topological dimension of the entities (0 nodes, ..., tdim cells).
         entities: Local indices, owned and ghost, sorted, shape (n_entities,).
+        points: Of a group of nodes that holds midside nodes, which are no entities of DOLFINx: the
+            local geometry nodes of all of it, owned and ghost, sorted, shape (n_points,); ``None``
+            where the entities say all.
     """
 
     dim: int
     entities: npt.NDArray[np.int32]
+    points: npt.NDArray[np.int32] | None = None
 
 
 @dataclass(frozen=True)

@@ -94,6 +94,13 @@ def reference(cell: str, order: int) -> basix.finite_element.FiniteElement:
     )
 
 
+def vertices_of(raw: RawMesh) -> npt.NDArray[np.bool_]:
+    """Which nodes are vertices of cells, shape (n_nodes,)."""
+    found = np.zeros(len(raw.points), dtype=bool)
+    found[raw.cells[:, : raw.n_vertices(raw.tdim)]] = True
+    return found
+
+
 def row_ids(rows: Ints) -> Ints:
     """Number rows so that equal rows, and only those, get the same number.
 
@@ -179,18 +186,21 @@ def _determinant(jacobians: Floats) -> Floats:
     return area * np.where(np.einsum("cpx,cx->cp", normal, normal[:, 0]) < 0.0, -1.0, 1.0)
 
 
-def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
+def on_root(
+    comm: MPI.Comm, work: Callable[[], T], kind: type[FxcrackError] = MeshError
+) -> T | None:
     """Run ``work`` on rank 0; whatever it raises is raised on every rank; collective.
 
     Args:
         comm: Communicator on which all ranks call.
         work: Called on rank 0 only; must not communicate.
+        kind: Class of the exception that is raised.
 
     Returns:
         What ``work`` returned on rank 0, ``None`` on the others.
 
     Raises:
-        MeshError: With the message of the exception on rank 0.
+        FxcrackError: ``kind`` with the message of the exception on rank 0.
     """
     result: T | None = None
     problem: str | None = None
@@ -203,7 +213,7 @@ def on_root(comm: MPI.Comm, work: Callable[[], T]) -> T | None:
         except Exception as error:  # any exception must reach the other ranks
             problem, cause = f"{type(error).__name__} while making a mesh: {error}", error
     try:
-        raise_on_all_ranks(comm, problem, MeshError)
-    except MeshError as error:
+        raise_on_all_ranks(comm, problem, kind)
+    except kind as error:
         raise error from cause
     return result

@@ -1,4 +1,4 @@
-"""Meshes from gmsh: models in memory and .msh files, with every physical group a named group.
+"""Meshes from gmsh: models in memory and mesh files, with every physical group a named group.
 
 gmsh is touched on rank 0 only; what goes wrong there is raised on every rank.
 """
@@ -20,6 +20,9 @@ from fxcrack.mesh.mesh import Mesh
 from fxcrack.mesh.raw import RawMesh, check_shapes, on_root
 from fxcrack.mesh.split import Split, split_surface
 
+_READABLE = (".msh", ".unv", ".med", ".cgns")
+"""Mesh files that gmsh reads with their groups."""
+
 
 def read_mesh(
     path: str | Path,
@@ -28,10 +31,11 @@ def read_mesh(
     gdim: int | None = None,
     split: Sequence[Split] = (),
 ) -> Mesh:
-    """Read a gmsh .msh file; collective.
+    """Read a mesh file through gmsh; collective.
 
     Args:
-        path: The file, of any .msh version gmsh reads; opened on rank 0 only.
+        path: A .msh file of any version, or a .unv, .med or .cgns file, whose groups become named
+            groups as well; opened on rank 0 only.
         comm: Communicator to distribute the mesh over.
         gdim: Geometric dimension; ``None`` takes that of the cells, 3 keeps surface cells in space
             (the reference surface of shells).
@@ -41,15 +45,16 @@ def read_mesh(
         The mesh, named after the file.
 
     Raises:
-        MeshError: The file is missing or not a .msh file, or as :func:`mesh_from_gmsh`.
+        MeshError: The file is missing or of another kind, or as :func:`mesh_from_gmsh`.
     """
     path = Path(path)
     split = check_list("read_mesh", "split", split, Split)
 
     def work() -> RawMesh:
-        if path.suffix.lower() != ".msh":
+        if path.suffix.lower() not in _READABLE:
             raise MeshError(
-                f"'{path}' is not a .msh file; write one with gmsh.write('{path.stem}.msh')"
+                f"'{path}' is not a .msh file; write one with gmsh.write('{path.stem}.msh'), or "
+                "give a .unv, .med or .cgns file"
             )
         if not path.is_file():
             raise MeshError(f"there is no mesh file '{path}' (looked in {Path.cwd()})")
@@ -111,6 +116,7 @@ def gmsh_model(name: str) -> Iterator[Any]:
 
     started = not gmsh.isInitialized()
     before = None if started else gmsh.model.getCurrent()
+    others = [] if started else gmsh.model.list()
     if started:
         gmsh.initialize(readConfigFiles=False, interruptible=False)
         gmsh.option.setNumber("General.Terminal", 0)
@@ -122,6 +128,9 @@ def gmsh_model(name: str) -> Iterator[Any]:
             gmsh.finalize()
         else:
             gmsh.model.remove()
+            for left in set(gmsh.model.list()) - set(others):  # a .med file makes one of its own
+                gmsh.model.setCurrent(left)
+                gmsh.model.remove()
             gmsh.model.setCurrent(before)
 
 

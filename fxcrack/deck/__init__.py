@@ -1,0 +1,1 @@
+"""Keyword decks (*.inp): text -> cards -> mesh, sets, surfaces -> scene and steps."""

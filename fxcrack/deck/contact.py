@@ -1,0 +1,446 @@
+"""Contact pairs, bonded parts and ties of a deck as interfaces, and ``*DEBOND`` as debonds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.errors import InputError
+from fxcrack.criteria import (
+    AmplitudeRelease,
+    Criterion,
+    EnhancedVCCT,
+    Fatigue,
+    RampRelease,
+    ReleaseLaw,
+    StepRelease,
+)
+from fxcrack.criteria.energy_release import RateCriterion
+from fxcrack.deck.cards import Card, Row, key, label
+from fxcrack.deck.flat import Flat
+from fxcrack.deck.fracture import NodalRates, read_criterion
+from fxcrack.deck.groups import Groups
+from fxcrack.deck.model import Family
+from fxcrack.deck.report import Report
+from fxcrack.interface.pairing import Interface
+from fxcrack.steps.debond import Debond
+
+
+@dataclass(frozen=True)
+class Everywhere:
+    """Marks all nodes or none."""
+
+    value: bool
+
+    def __call__(self, x: Array) -> Array:
+        """One truth value per position; x of shape (3, n)."""
+        return np.full(np.shape(x)[1], self.value)
+
+
+@dataclass(eq=False)
+class PairDef:
+    """A contact pair of the deck.
+
+    Attributes:
+        row: Its data line.
+        slave: Name of the slave surface.
+        master: Name of the master surface.
+        title: Name of the interface: that of its slave, with its master where that is not enough.
+        bonded: Line of the initial conditions that bonds it, None: not bonded.
+        normal_only: Whether the bond holds in the normal direction only.
+        debonds: Its ``*DEBOND`` and ``*FRACTURE CRITERION`` cards, with the number of their step.
+        interface: What is made of it.
+    """
+
+    row: Row
+    slave: str
+    master: str
+    title: str
+    bonded: Row | None = None
+    normal_only: bool = False
+    debonds: list[tuple[int, Card, Card]] = field(default_factory=list)
+    interface: Interface | None = None
+
+
+class Contacts:
+    """All interfaces of a deck.
+
+    Args:
+        cards: Model data.
+        flat: The model.
+        groups: Takes their surfaces.
+        report: Takes what is replaced.
+        finite: Whether bodies turn far (NLGEOM).
+
+    Attributes:
+        pairs: The contact pairs.
+
+    Raises:
+        DeckError: A card cannot be read, or names what does not exist.
+    """
+
+    def __init__(
+        self, cards: Sequence[Card], flat: Flat, groups: Groups, report: Report, finite: bool
+    ) -> None:
+        self._flat, self._groups, self._report, self._finite = flat, groups, report, finite
+        self.pairs: list[PairDef] = []
+        self._clearances = [card for card in cards if card.keyword == "CLEARANCE"]
+        for card in cards:
+            if card.keyword in ("CONTACTCLEARANCE", "CONTACTCLEARANCEASSIGNMENT"):
+                self._refuse_clearance(card)
+            if card.keyword == "CONTACTPAIR":
+                for row in card.need_rows("slave surface, master surface"):
+                    self._add_pair(row)
+        for card in cards:
+            if card.keyword == "INITIALCONDITIONS" and card.word("TYPE") == "CONTACT":
+                for row in card.need_rows("slave surface, master surface, bonded node set"):
+                    self._bond(row, card.has("NORMAL"))
+        self._ties = [card for card in cards if card.keyword == "TIE"]
+        nodal = [card for card in cards if card.keyword == "NODALENERGYRATE"]
+        self._nodal = NodalRates(nodal, flat) if nodal else None
+
+    def _refuse_clearance(self, card: Card) -> None:
+        if card.has("SEARCH NSET") and card.has("SEARCH ABOVE", "SEARCH BELOW"):
+            card.fail("SEARCH NSET excludes SEARCH ABOVE and SEARCH BELOW; give one of them")
+        card.fail(
+            "it belongs to explicit dynamics with general contact, which is not available yet; in "
+            "quasi-static decks bond the pair by *INITIAL CONDITIONS, TYPE=CONTACT"
+        )
+
+    # -- pairs ---------------------------------------------------------------------------
+
+    def _add_pair(self, row: Row) -> None:
+        card = row.card
+        slave, master = label(row.text(0)), label(row.text(1))
+        if not master or key(slave) == key(master):
+            row.fail(
+                f"surface '{slave}' is paired with itself; self-contact is not available: name two "
+                "surfaces"
+            )
+        if not slave:
+            row.fail("the slave surface is missing")
+        if any(key(p.slave) == key(slave) and key(p.master) == key(master) for p in self.pairs):
+            row.fail("this pair is defined already")
+        alone = all(key(p.slave) != key(slave) for p in self.pairs)
+        title = slave if alone else f"{slave} on {master}"
+        self.pairs.append(PairDef(row, slave, master, title))
+        card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "NODE TO SURFACE")
+
+    def _bond(self, row: Row, normal_only: bool) -> None:
+        slave, master = key(row.text(0)), key(row.text(1))
+        chosen = [
+            p
+            for p in self.pairs
+            if (not slave or key(p.slave) == slave) and (not master or key(p.master) == master)
+        ]
+        if not chosen or not (slave or master):
+            row.fail(
+                f"there is no contact pair of '{label(row.text(0))}' and '{label(row.text(1))}'; "
+                "define it by *CONTACT PAIR"
+            )
+        name = label(row.text(2))
+        if len(chosen) > 1 and name:
+            marked = self._flat.nodes(row.card, name, row.index)
+            chosen = [p for p in chosen if np.isin(self._slave_nodes(p), marked).any()]
+        for pair in chosen:
+            if pair.bonded is not None:
+                row.fail(f"the pair '{pair.title}' is bonded already")
+            word = pair.row.card.word("TYPE", "NODETOSURFACE")
+            if word == "SURFACETOSURFACE" and not pair.row.card.has("SMALL SLIDING"):
+                pair.row.fail(
+                    "finite-sliding surface-to-surface contact is not possible for a pair that is "
+                    "bonded; add SMALL SLIDING"
+                )
+            pair.bonded, pair.normal_only = row, normal_only
+
+    def _slave_nodes(self, pair: PairDef) -> Ints:
+        return np.unique(self._flat.surface(pair.row.card, pair.slave, pair.row.index))
+
+    # -- debonds of the steps ------------------------------------------------------------
+
+    def take(self, number: int, cards: Sequence[Card]) -> list[str]:
+        """Read the ``*DEBOND`` cards of a step.
+
+        Args:
+            number: Of the step.
+            cards: Of the step.
+
+        Returns:
+            Titles of the interfaces that may grow in it.
+
+        Raises:
+            DeckError: The criterion is missing, or the pair does not exist or is not bonded.
+        """
+        grow = []
+        for i, card in enumerate(cards):
+            if card.keyword == "FRACTURECRITERION" and (i == 0 or cards[i - 1].keyword != "DEBOND"):
+                card.fail("it must stand directly after *DEBOND")
+            if card.keyword != "DEBOND":
+                continue
+            if i + 1 == len(cards) or cards[i + 1].keyword != "FRACTURECRITERION":
+                card.fail("*FRACTURE CRITERION must stand directly after it")
+            slave, master = card.text("SLAVE", "SECONDARY"), card.text("MASTER", "MAIN")
+            found = [
+                p for p in self.pairs if key(p.slave) == key(slave) and key(p.master) == key(master)
+            ]
+            if not found:
+                card.fail(
+                    f"there is no contact pair of '{slave}' and '{master}'; define it by *CONTACT "
+                    "PAIR"
+                )
+            if found[0].bonded is None:
+                card.fail(
+                    f"the pair of '{slave}' and '{master}' is not bonded; bond it by *INITIAL "
+                    "CONDITIONS, TYPE=CONTACT"
+                )
+            if any(n == number for n, _, _ in found[0].debonds):
+                card.fail("the pair has a criterion in this step already; one is possible")
+            found[0].debonds.append((number, card, cards[i + 1]))
+            grow.append(found[0].title)
+        return grow
+
+    # -- the scene -----------------------------------------------------------------------
+
+    def build(
+        self, interactions: dict[str, Family], supported: Ints
+    ) -> tuple[list[Debond], list[Interface]]:
+        """Debonds and bonds of the scene.
+
+        Args:
+            interactions: Properties of contact by key.
+            supported: Nodes that supports hold, ascending.
+
+        Raises:
+            DeckError: A property is not available, or contradicts another.
+        """
+        debonds, bonds = [], []
+        for pair in self.pairs:
+            pair.interface = self._interface(pair, interactions)
+            if not pair.debonds:
+                bonds.append(pair.interface)
+                continue
+            debonds.append(self._debond(pair))
+            held = np.intersect1d(self._slave_nodes(pair), supported)
+            if len(held):
+                log.warn(
+                    "%s: supports hold %d nodes of the crack surface '%s'",
+                    pair.row.card.place,
+                    len(held),
+                    pair.slave,
+                )
+            self._check_wake(pair)
+        for card in self._ties:
+            bonds += [self._tie(row) for row in card.need_rows("slave surface, master surface")]
+        return debonds, bonds
+
+    def _check_wake(self, pair: PairDef) -> None:
+        """Look at the tips on a line: at corner nodes, with two open elements behind them.
+
+        Surface-to-surface pairs need the latter; fewer are warned of.
+
+        Raises:
+            DeckError: A tip is a midside node.
+        """
+        if self._flat.kind.gdim == 3:
+            return
+        assert pair.bonded is not None
+        name = label(pair.bonded.text(2))
+        if not name:
+            return
+        bonded = self._flat.nodes(pair.bonded.card, name, pair.bonded.index)
+        rows = self._flat.surface(pair.row.card, pair.slave, pair.row.index)
+        marks = np.isin(rows, bonded)
+        if rows.shape[1] == 3 and self._flat.given_kind.order == 2:
+            at_middle = marks[:, 2] & ~marks[:, :2].all(axis=1)
+            if np.any(at_middle):
+                x = self._flat.points[rows[np.argmax(at_middle), 2]]
+                pair.bonded.fail(
+                    f"the tip at ({x[0]:g}, {x[1]:g}) is a midside node; the open part must cover "
+                    "whole element faces: let the bonded set begin at a corner node"
+                )
+        n_open = int((~marks[:, :2]).any(axis=1).sum())
+        if 0 < n_open < 2 and pair.row.card.word("TYPE") == "SURFACETOSURFACE":
+            log.warn(
+                "%s: only %d element of '%s' lies behind the crack tip; surface-to-surface pairs "
+                "need two or more",
+                pair.row.card.place,
+                n_open,
+                pair.slave,
+            )
+
+    def _interface(self, pair: PairDef, interactions: dict[str, Family]) -> Interface:
+        card, flat, groups = pair.row.card, self._flat, self._groups
+        index = pair.row.index
+        slave = groups.facets(pair.slave, flat.surface(card, pair.slave, index))
+        master = groups.facets(pair.master, flat.surface(card, pair.master, index))
+        bonded: object = Everywhere(card.has("TIED"))
+        if pair.bonded is not None:
+            name = label(pair.bonded.text(2))
+            bonded = None
+            if name:
+                found = flat.nodes(pair.bonded.card, name, pair.bonded.index)
+                bonded = groups.support(pair.bonded.card, name, found, words="nodes")
+        friction = self._friction(pair, interactions)
+        if friction and pair.normal_only:
+            pair.row.fail("NORMAL bonds and *FRICTION exclude each other; leave one out")
+        gap = "adjust" if card.has("ADJUST") or card.has("TIED") else "keep"
+        if self._clearance_of(pair):
+            gap = "adjust"
+        return Interface(
+            slave,
+            master,
+            bonded=bonded,  # type: ignore[arg-type]
+            contact=not card.has("TIED"),
+            friction=friction,
+            normal_only=pair.normal_only,
+            gap=gap,
+            name=pair.title,
+        )
+
+    def _clearance_of(self, pair: PairDef) -> bool:
+        """Whether a clearance that is nothing beside the elements is given for a pair."""
+        for card in self._clearances:
+            names = key(card.text("SLAVE", "SECONDARY")), key(card.text("MASTER", "MAIN"))
+            if names != (key(pair.slave), key(pair.master)):
+                continue
+            value = card.number("VALUE", 0.0)
+            if not card.has("VALUE") or card.lines:
+                card.fail("give VALUE; clearances by node are not available")
+            rows = self._flat.surface(card, pair.slave)
+            x = self._flat.points[rows]
+            size = float(np.linalg.norm(np.ptp(x, axis=1), axis=1).mean())
+            if abs(value) > 1e-3 * size:
+                card.fail(
+                    f"the clearance {value:g} is no small part of the element size {size:.3g}; "
+                    "move the nodes apart instead"
+                )
+            self._report.replace(
+                f"the clearance {value:g} of '{pair.title}' counts as zero: it only serves the "
+                "other program's contact iterations",
+                card,
+            )
+            return True
+        return False
+
+    def _friction(self, pair: PairDef, interactions: dict[str, Family]) -> float | None:
+        card = pair.row.card
+        if not card.has("INTERACTION"):
+            return None
+        name = card.text("INTERACTION")
+        if key(name) not in interactions:
+            card.fail(f"there is no surface interaction '{name}'; define it")
+        family = interactions[key(name)]
+        behavior = family.first("SURFACEBEHAVIOR")
+        if behavior is not None and behavior.word("PRESSURE-OVERCLOSURE", "HARD") != "HARD":
+            behavior.fail(
+                f"PRESSURE-OVERCLOSURE={behavior.text('PRESSURE-OVERCLOSURE')} is not available; "
+                "contact is exact here, PRESSURE-OVERCLOSURE=HARD"
+            )
+        if self._flat.kind.gdim == 2:
+            self._note_thickness(family)
+        card = family.first("FRICTION")  # type: ignore[assignment]
+        if card is None:
+            return None
+        if card.has("ROUGH"):
+            card.fail("ROUGH is not available; give a large coefficient of friction")
+        rows = card.rows()
+        if len(rows) > 1 or any(row.text(i) for row in rows for i in range(1, len(row))):
+            card.fail("only one coefficient is available; no tables, no shear limit")
+        return (rows[0].number(0, 0.0) if rows else 0.0) or None
+
+    def _note_thickness(self, family: Family) -> None:
+        rows = family.card.rows()
+        given = rows[0].number(0, 1.0) if rows else 1.0
+        for placed in self._flat.placed.values():
+            for section in placed.space.sections:
+                data = section.rows()
+                if data and data[0].number(0, 1.0) != given:
+                    self._report.replace(
+                        f"the interface has the thickness of the bodies, "
+                        f"{data[0].number(0, 1.0):g}, not {given:g}",
+                        family.card,
+                    )
+
+    def _debond(self, pair: PairDef) -> Debond:
+        assert pair.interface is not None
+        _, card, criterion_card = pair.debonds[0]
+        for _, other, of_other in pair.debonds[1:]:
+            if of_other.options != criterion_card.options or of_other.lines != criterion_card.lines:
+                of_other.fail(
+                    f"the pair has another criterion before ({criterion_card.place}); a pair has "
+                    "one criterion in all steps"
+                )
+            if _release_words(other) != _release_words(card):
+                other.fail("the bond force falls in another way than in the step before")
+        criterion = read_criterion(
+            criterion_card,
+            self._flat,
+            self._groups,
+            self._nodal,
+            self._slave_nodes(pair),
+            finite=self._finite,
+        )
+        if self._flat.kind.gdim == 3 and not isinstance(criterion, RateCriterion):
+            self._report.replace(
+                "this criterion is for 2-D in other programs; it is used on the 3-D front",
+                criterion_card,
+            )
+        if pair.normal_only and isinstance(criterion, RateCriterion):
+            criterion_card.fail("a bond in the NORMAL direction only is not possible with it")
+        release = _release(card, criterion)
+        try:
+            return Debond(pair.interface, criterion, release)
+        except InputError as error:
+            criterion_card.fail(str(error))
+
+    def _tie(self, row: Row) -> Interface:
+        card, flat, groups = row.card, self._flat, self._groups
+        slave, master = label(row.text(0)), label(row.text(1))
+        if not slave or not master or key(slave) == key(master):
+            row.fail("a tie needs two surfaces, slave and master")
+        card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "SURFACE TO SURFACE")
+        tolerance = card.number("POSITION TOLERANCE", 0.0) or None
+        return Interface(
+            groups.facets(slave, flat.surface(card, slave, row.index)),
+            groups.facets(master, flat.surface(card, master, row.index)),
+            bonded=Everywhere(True),
+            tolerance=tolerance,
+            name=card.text("NAME", default=slave),
+        )
+
+
+def _release_words(card: Card) -> tuple[object, ...]:
+    words = {k: v for k, v in card.options.items() if k not in ("FREQUENCY", "OUTPUT")}
+    return tuple(sorted(words.items(), key=str)), tuple(card.lines)
+
+
+def _release(card: Card, criterion: Criterion) -> ReleaseLaw:
+    """How the bond force goes to zero."""
+    force = card.choose("DEBONDING FORCE", ("STEP", "RAMP"), "STEP")
+    numbers = [x for row in card.rows() for x in row.numbers()]
+    if isinstance(criterion, RateCriterion):
+        if numbers:
+            card.fail(
+                "a debonding amplitude belongs to critical stress, COD and crack length; with "
+                "energy release rates give DEBONDING FORCE=STEP or RAMP"
+            )
+        if isinstance(criterion, Fatigue | EnhancedVCCT) or force == "STEP":
+            if force == "RAMP" and isinstance(criterion, Fatigue):
+                card.fail("in cycles bonds are released at once; give DEBONDING FORCE=STEP")
+            return StepRelease()
+        return RampRelease()
+    if card.has("DEBONDING FORCE"):
+        card.fail("DEBONDING FORCE belongs to energy release rates; give an amplitude instead")
+    if not numbers:
+        return StepRelease()
+    if len(numbers) % 2:
+        card.fail("the amplitude's numbers are no pairs of relative time and relative force")
+    first = card.number("TIME INCREMENT", 0.0) or None
+    try:
+        return AmplitudeRelease(numbers[::2], numbers[1::2], first)
+    except InputError as error:
+        card.fail(str(error))

@@ -1,0 +1,146 @@
+"""A deck read: the scene it describes and its steps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, cast
+
+from mpi4py import MPI
+
+from fxcrack.base import log
+from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.deck.cards import DeckError
+from fxcrack.deck.model import read_model
+from fxcrack.deck.procedures import DeckStep
+from fxcrack.deck.reader import read_cards
+from fxcrack.deck.report import Report
+from fxcrack.deck.translate import Translated, translate
+from fxcrack.history import History
+from fxcrack.mesh.distribute import distribute
+from fxcrack.mesh.raw import on_root
+from fxcrack.scene import Scene
+
+
+class Deck:
+    """The scene of a keyword deck and its steps, which can be changed and run.
+
+    Attributes:
+        scene: The scene; another one may be put in its place, e.g. one of
+            ``deck.scene.rebuilt(debonds=[...])``.
+        steps: The steps in order: each has a name, a step for :meth:`fxcrack.Scene.run`, and the
+            names of the interfaces that may grow in it.
+        report: What was read, replaced and ignored.
+    """
+
+    def __init__(self, scene: Scene, steps: list[DeckStep], report: Report) -> None:
+        self.scene = scene
+        self.steps = steps
+        self.report = report
+
+    def run(self, **options: Any) -> History:
+        """Run all steps, one after the other; collective.
+
+        Args:
+            **options: Those of :meth:`fxcrack.Scene.run` but ``grow``.
+
+        Returns:
+            The history of all steps.
+
+        Raises:
+            InputError: An interface that is to grow is not part of the scene any more.
+        """
+        for step in self.steps:
+            self.run_step(step, **options)
+        return self.scene.history
+
+    def run_step(self, step: DeckStep, **options: Any) -> History:
+        """Run one step; arguments and errors as for :meth:`run`."""
+        by_title = {d.interface.title: d for d in self.scene.debonds}
+        for name in step.grow:
+            if name not in by_title:
+                raise InputError(
+                    f"step '{step.name}': interface '{name}' is not part of the scene; take it out "
+                    "of the step's grow"
+                )
+        return self.scene.run(step.step, grow=[by_title[n] for n in step.grow], **options)
+
+
+def read_deck(
+    path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD, *, order: int | None = None
+) -> Deck:
+    """Read a keyword deck (*.inp); collective.
+
+    What has no word in fxcrack is refused with file, line, card and what would help; what is
+    computed in another way than the deck says is warned of once and listed in ``deck.report``.
+
+    Args:
+        path: The deck; it and the files it includes are opened on rank 0 only.
+        comm: Communicator of the scene.
+        order: 2 raises first-order elements to the second order; by default they stay what they
+            are. Nodes added between two nodes of a set belong to it where it is held.
+
+    Raises:
+        DeckError: The deck cannot be read, or asks for what fxcrack does not have.
+        InputError: The scene it describes contradicts itself.
+    """
+    found = on_root(comm, lambda: translated(Path(path), order), DeckError)
+    raw = None if found is None else found.raw
+    shared: tuple[dict[str, Any], list[DeckStep], Report] = comm.bcast(
+        None if found is None else (found.arguments, found.steps, found.report)
+    )
+    arguments, steps, report = shared
+    for line in report.replaced:
+        log.warn("%s", line)
+    mesh = distribute(raw, comm, Path(path).stem)
+    try:
+        scene = Scene(mesh, **arguments)
+    except InputError as error:
+        raise DeckError(f"{Path(path).name}: {error}") from error
+    return Deck(scene, steps, report)
+
+
+def translated(path: Path, order: int | None = None) -> Translated:
+    """A deck in the words of a scene; on one rank. Arguments and errors as of :func:`read_deck`."""
+    report = Report(path.name)
+    return _translated(path, report, order)
+
+
+def _translated(path: Path, report: Report, order: int | None = None) -> Translated:
+    try:
+        cards = read_cards(path)
+        report.screen(cards)
+        model = read_model(cards, report)
+        report.check()
+        return translate(model, report, order)
+    except InputError as error:
+        if isinstance(error, DeckError):
+            raise
+        raise DeckError(f"{path.name}: {error}") from error
+
+
+def check_deck(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> Report:
+    """What reading a deck would do: read, replaced, ignored, refused; collective.
+
+    Args:
+        path: The deck.
+        comm: Communicator.
+
+    Returns:
+        The account, with all cards and elements that are refused by their name, and the first
+        thing that is wrong otherwise.
+    """
+    report = Report(Path(path).name)
+    if comm.rank == 0:
+        try:
+            _translated(Path(path), report)
+        except FxcrackError as error:
+            first = str(error).split(" (and ")[0]
+            if not any(first == line for line in report.refused):
+                report.refused.append(str(error))
+    report = cast(Report, comm.bcast(report))
+    if not report.refused:
+        try:
+            read_deck(path, comm).scene.close()
+        except FxcrackError as error:
+            report.refused.append(str(error))
+    return report

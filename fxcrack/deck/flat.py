@@ -1,0 +1,471 @@
+"""The whole model in one numbering: nodes, cells, sets and surfaces of all instances together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.errors import did_you_mean
+from fxcrack.deck.cards import Card, DeckError, key
+from fxcrack.deck.elements import ElementType, added_nodes, face_nodes, to_dolfinx
+from fxcrack.deck.model import Model
+from fxcrack.deck.spaces import HOME, NamedSet, Space, SurfaceDef, distinct, existing
+from fxcrack.mesh.raw import row_ids
+
+_PLANE = 1e-9
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A space in the numbering of the whole model.
+
+    Attributes:
+        space: The part's instance, or what stands outside of instances.
+        first_node: Number of its first node.
+        cell_labels: Numbers of its elements, ascending.
+        cells: The cell of each of them.
+    """
+
+    space: Space
+    first_node: int
+    cell_labels: Ints
+    cells: Ints
+
+    def cell_of(self, labels: Ints) -> Ints:
+        """Cell of each element number, -1 where there is none."""
+        if not len(self.cell_labels):
+            return np.full(len(labels), -1, dtype=np.int64)
+        at = np.minimum(np.searchsorted(self.cell_labels, labels), len(self.cell_labels) - 1)
+        return np.where(self.cell_labels[at] == labels, self.cells[at], -1)
+
+
+class Flat:
+    """Nodes, cells, sets and surfaces of a model in one numbering.
+
+    Args:
+        model: What the deck describes.
+        order: Order the elements are raised to; their own by default.
+
+    Attributes:
+        kind: Shape, order and kinematic model of all cells.
+        given_kind: The same as the deck gives it.
+        points: Positions of all nodes, those that no cell uses and added ones (last) included,
+            shape (n_nodes, 3).
+        cells: Nodes of each cell in the deck's order, centres last, shape (n_cells, n_cell_nodes).
+        used: Whether a cell has the node, shape (n_nodes,).
+        parents: Nodes of which each added node is made, shape (n_added, k), -1 for none; and
+            their weights, same shape.
+
+    Raises:
+        DeckError: There are no elements, or of several shapes, orders or kinematic models; an
+            element names a node that does not exist, or one node twice.
+    """
+
+    def __init__(self, model: Model, order: int | None = None) -> None:
+        self.model = model
+        spaces = {HOME: model.root, **model.instances}
+        if model.parts and not model.instances:
+            part = next(iter(model.parts.values()))
+            raise DeckError(
+                f"part '{part.name}' has no *INSTANCE, so the model has no body; add *ASSEMBLY "
+                "with an *INSTANCE of each part"
+            )
+        self.kind = _one_kind(list(spaces.values()))
+        self.placed: dict[str, Placed] = {}
+        points, blocks, n_nodes, n_cells = [], [], 0, 0
+        for name, space in spaces.items():
+            labels, cells = [], []
+            for block in space.elements.values():
+                if not len(block.table.labels):
+                    continue
+                nodes = np.asarray(block.table.rows, dtype=np.int64)
+                at = space.nodes.find(nodes)
+                if np.any(at < 0):
+                    row, column = np.argwhere(at < 0)[0]
+                    block.card.fail(
+                        f"element {int(block.table.labels[row])} has node "
+                        f"{int(nodes[row, column])}, which is not defined"
+                    )
+                blocks.append(at + n_nodes)
+                labels.append(block.table.labels)
+                cells.append(n_cells + np.arange(len(nodes)))
+                _check_nodes(block.card, block.table.labels, nodes)
+                n_cells += len(nodes)
+            all_labels = np.concatenate(labels) if labels else np.zeros(0, dtype=np.int64)
+            all_cells = np.concatenate(cells) if cells else np.zeros(0, dtype=np.int64)
+            by_label = np.argsort(all_labels, kind="stable")
+            twice = np.flatnonzero(np.diff(all_labels[by_label]) == 0)
+            if len(twice):
+                raise DeckError(
+                    f"element {int(all_labels[by_label][twice[0]])} is defined with two types; "
+                    "give every element a number of its own"
+                )
+            self.placed[name] = Placed(space, n_nodes, all_labels[by_label], all_cells[by_label])
+            points.append(space.places())
+            n_nodes += len(space.nodes.labels)
+        self.points = np.concatenate(points)
+        self.cells = np.concatenate(blocks)
+        self.n_given = n_nodes
+        self.parents = np.zeros((0, 8), dtype=np.int64)
+        self.weights = np.zeros((0, 8))
+        self.given_kind = self.kind
+        if order is not None and not self.kind.order <= order <= 2:
+            raise DeckError(
+                f"order = {order} is not possible with {self.kind.name} elements; 2 is, and "
+                f"{self.kind.order}, their own"
+            )
+        if self.kind.serendipity or (order == 2 and self.kind.order == 1):
+            self._raise_order()
+            self.kind = replace(self.kind, order=2)
+        self.used = np.zeros(len(self.points), dtype=bool)
+        self.used[self.cells] = True
+        self._check_plane()
+        self._faces: tuple[Ints, Ints] | None = None
+
+    def _raise_order(self) -> None:
+        """Append the nodes that a whole second-order element lacks, each once."""
+        parents, weights = added_nodes(self.kind)
+        width = max(len(p) for p in parents)
+        self.parents = np.zeros((0, width), dtype=np.int64)
+        self.weights = np.zeros((0, width))
+        numbers = []
+        n, columns = len(self.points), self.cells[:, : self.kind.n_nodes]
+        for local, weight in zip(parents, weights, strict=True):
+            nodes = columns[:, local]
+            if len(local) == self.kind.n_nodes:
+                first = np.arange(len(nodes))
+                inverse = first
+            else:
+                ids = row_ids(np.sort(nodes, axis=1))
+                _, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
+            kept = np.full((len(first), width), -1, dtype=np.int64)
+            kept[:, : len(local)] = nodes[first]
+            scale = np.zeros((len(first), width))
+            scale[:, : len(local)] = weight
+            known = self._known_faces(kept, len(local))
+            new = known < 0
+            number = known.copy()
+            number[new] = n + len(self.parents) + np.arange(int(new.sum()))
+            self.parents = np.concatenate((self.parents, kept[new]))
+            self.weights = np.concatenate((self.weights, scale[new]))
+            numbers.append(number[inverse])
+        added = np.einsum("nk,nkc->nc", self.weights, self.points[np.maximum(self.parents, 0)])
+        self.points = np.concatenate((self.points, added))
+        self.cells = np.column_stack((columns, *numbers))
+
+    def _known_faces(self, nodes: Ints, n: int) -> Ints:
+        """Number of the centre that faces of another local number already have, -1 for none."""
+        out = np.full(len(nodes), -1, dtype=np.int64)
+        if not len(self.parents) or n == self.kind.n_nodes:
+            return out
+        both = np.concatenate((self.parents[:, :n], nodes[:, :n]))
+        ids = row_ids(np.sort(both, axis=1))
+        old, mine = ids[: len(self.parents)], ids[len(self.parents) :]
+        order = np.argsort(old)
+        at = np.minimum(np.searchsorted(old[order], mine), len(old) - 1)
+        found = old[order][at] == mine
+        out[found] = len(self.points) + order[at][found]
+        return out
+
+    def _check_plane(self) -> None:
+        """Refuse plane elements off the plane z = 0."""
+        if self.kind.gdim == 3:
+            return
+        x = self.points[self.used]
+        size = float(np.ptp(x[:, :2], axis=0).max(initial=0.0))
+        z = x[:, 2]
+        if np.any(np.abs(z - z[0]) > _PLANE * size):
+            raise DeckError(
+                f"{self.kind.model} elements must lie in one plane z = constant, but z varies from "
+                f"{z.min():g} to {z.max():g}"
+            )
+
+    # -- names ---------------------------------------------------------------------------
+
+    def _resolve(self, card: Card, name: str, kind: str, index: int | None) -> tuple[str, NamedSet]:
+        """The space and the set that a name means."""
+        text, root = key(name), self.model.root
+        if text in getattr(root, kind):
+            return "", getattr(root, kind)[text]
+        words = text.split(".")
+        for i in range(1, len(words)):
+            inner = ".".join(words[i:])
+            for j in range(i):  # the assembly's name may stand before that of the instance
+                place = ".".join(words[j:i])
+                space = self.model.instances.get(place)
+                if space is not None and inner in getattr(space, kind):
+                    return place, getattr(space, kind)[inner]
+            if inner in getattr(root, kind):
+                return "", getattr(root, kind)[inner]
+        known = dict(getattr(root, kind))
+        for place, space in self.model.instances.items():
+            known |= {f"{place}.{k}": s for k, s in getattr(space, kind).items()}
+        what = {"nsets": "node set", "elsets": "element set", "surfaces": "surface"}[kind]
+        return card.fail(f"there is no {what} '{name}'{did_you_mean(text, known)}", index)
+
+    def _of_set(self, place: str, found: NamedSet, kind: str) -> Ints:
+        """Global members of a set."""
+        out = []
+        for space_name, labels in found.members.items():
+            placed = self.placed[space_name or place]
+            if kind == "nsets":
+                at = placed.space.nodes.find(labels)
+                at = existing(found.card, found.name, labels, at, "nodes") + placed.first_node
+            else:
+                at = placed.cell_of(labels)
+                at = existing(found.card, found.name, labels, at, "elements")
+            out.append(at)
+        return distinct(np.concatenate(out)) if out else np.zeros(0, dtype=np.int64)
+
+    def _member(self, card: Card, name: str, index: int | None, kind: str) -> Ints:
+        """One node or element, "12" or "inst.12"."""
+        first, _, number = key(name).rpartition(".")
+        place = first if first in self.placed else first.rpartition(".")[2]
+        if place not in self.placed:
+            card.fail(f"there is no instance '{first}'", index)
+        placed, labels = self.placed[place], np.array([int(number)])
+        at = placed.space.nodes.find(labels) if kind == "nsets" else placed.cell_of(labels)
+        if at[0] < 0:
+            card.fail(f"{'node' if kind == 'nsets' else 'element'} {name} does not exist", index)
+        return at + placed.first_node if kind == "nsets" else at
+
+    def nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
+        """Nodes of a set, or one node by its number; ascending, shape (n,).
+
+        Args:
+            card: For messages.
+            name: "set", "12", "instance.set" or "instance.12".
+            index: Data line, for messages.
+
+        Raises:
+            DeckError: There is no such set or node.
+        """
+        if key(name).rpartition(".")[2].isdigit():
+            return self._member(card, name, index, "nsets")
+        return self._of_set(*self._resolve(card, name, "nsets", index), "nsets")
+
+    def elements(self, card: Card, name: str, index: int | None = None) -> Ints:
+        """Cells of an element set, or one element; arguments and error as for :meth:`nodes`."""
+        if key(name).rpartition(".")[2].isdigit():
+            return self._member(card, name, index, "elsets")
+        return self._of_set(*self._resolve(card, name, "elsets", index), "elsets")
+
+    def in_space(self, space: str, card: Card, elset: str) -> Ints:
+        """Cells of an element set of one space (sections of instances)."""
+        sets = self.placed[space].space.elsets
+        if key(elset) not in sets:
+            card.fail(f"there is no element set '{elset}'{did_you_mean(key(elset), sets)}")
+        return self._of_set(space, sets[key(elset)], "elsets")
+
+    # -- faces ---------------------------------------------------------------------------
+
+    @property
+    def _face_ids(self) -> tuple[Ints, Ints]:
+        """Nodes of every face of every cell, and how many cells have each; by cell, then face."""
+        if self._faces is None:
+            table = face_nodes(self.kind.cell, self.kind.order)
+            n_corners = 2 if self.kind.gdim == 2 else {"tetrahedron": 3}.get(self.kind.cell, 4)
+            rows = self.cells[:, table]
+            corners = np.sort(rows[:, :, :n_corners].reshape(-1, n_corners), axis=1)
+            self._faces = rows, _repetitions(corners).reshape(len(self.cells), -1)
+        return self._faces
+
+    def faces(self, card: Card, cells: Ints, face: int, index: int | None = None) -> Ints:
+        """Nodes of a face of some cells, rows of a group of facets, shape (n, n_face_nodes).
+
+        Args:
+            card: For messages.
+            cells: The cells, shape (n,).
+            face: Number of the face, from 1.
+            index: Data line, for messages.
+
+        Raises:
+            DeckError: The cells have no such face, or it lies inside the body.
+        """
+        rows, count = self._face_ids
+        if not 1 <= face <= rows.shape[1]:
+            card.fail(f"a {self.kind.cell} has faces 1 to {rows.shape[1]}, not {face}", index)
+        inside = count[cells, face - 1] > 1
+        if np.any(inside):
+            card.fail(
+                f"face {face} of {int(inside.sum())} of {len(cells)} elements lies inside; only "
+                "faces on its outside can be loaded or paired",
+                index,
+            )
+        return np.asarray(rows[cells, face - 1])
+
+    def outer_side(self, cells: Ints, face: int) -> Ints:
+        """Nodes of a face of some cells where it lies on the outside; rows as of :meth:`faces`."""
+        rows, count = self._face_ids
+        return np.asarray(rows[cells, face - 1][count[cells, face - 1] == 1])
+
+    def outside(self, cells: Ints) -> Ints:
+        """Nodes of the faces of some cells that no other cell has; rows as of :meth:`faces`."""
+        rows, count = self._face_ids
+        return np.asarray(rows[cells][count[cells] == 1])
+
+    def surface(self, card: Card, name: str, index: int | None = None) -> Ints:
+        """Nodes of the facets of a surface, rows as of :meth:`faces`.
+
+        Raises:
+            DeckError: There is no such surface, or it is none of facets.
+        """
+        place, found = self._resolve(card, name, "surfaces", index)
+        assert isinstance(found, SurfaceDef)
+        return self.facets_of(place, found)
+
+    def facets_of(self, place: str, surface: SurfaceDef) -> Ints:
+        """Nodes of the facets of a surface of a space; rows as of :meth:`faces`."""
+        card = surface.card
+        kind = card.word("TYPE", "ELEMENT")
+        if kind == "NODE":
+            return self._node_surface(card, place)
+        if kind != "ELEMENT":
+            card.fail(
+                f"TYPE={kind} is not available; define surfaces by element faces (TYPE=ELEMENT) or "
+                "nodes (TYPE=NODE), and rigid ones by the faces of a stiff body"
+            )
+        parts = []
+        for row in card.need_rows("element set, face"):
+            side = row.text(1).upper()
+            if not row.text(0):
+                cells = np.arange(len(self.cells))
+            else:
+                cells = self._in(card, place, row.text(0), row.index, "elsets")
+            if not side:
+                parts.append(self.outside(cells))
+            elif side[:1] == "S" and side[1:].isdigit():
+                parts.append(self.faces(card, cells, int(side[1:]), row.index))
+            else:
+                row.fail(
+                    f"face {side} is not available on {self.kind.name} elements; S1, S2, ... are"
+                )
+        rows = np.concatenate(parts)
+        if not len(rows):
+            card.fail("the surface has no face")
+        ids = row_ids(np.sort(rows, axis=1))
+        return np.asarray(rows[np.sort(np.unique(ids, return_index=True)[1])])
+
+    def _in(self, card: Card, place: str, name: str, index: int, kind: str) -> Ints:
+        """Members of a set that a card inside a space names."""
+        if place:
+            sets = getattr(self.placed[place].space, kind)
+            if key(name) in sets:
+                return self._of_set(place, sets[key(name)], kind)
+            if name.isdigit():
+                return self._member(card, f"{place}.{name}", index, kind)
+        return self.nodes(card, name, index) if kind == "nsets" else self.elements(
+            card, name, index
+        )  # fmt: skip
+
+    def surface_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
+        """Nodes of a surface of faces or of nodes, ascending."""
+        place, found = self._resolve(card, name, "surfaces", index)
+        assert isinstance(found, SurfaceDef)
+        if found.card.word("TYPE") == "NODE":
+            return self._surface_node_list(found.card, place)
+        return distinct(self.facets_of(place, found).ravel())
+
+    def _surface_node_list(self, card: Card, place: str) -> Ints:
+        parts = [
+            self._in(card, place, row.text(0), row.index, "nsets")
+            for row in card.need_rows("node set")
+        ]
+        return distinct(np.concatenate(parts))
+
+    def _node_surface(self, card: Card, place: str) -> Ints:
+        """Faces of a surface of nodes: those on the outside all of whose nodes belong to it."""
+        nodes = self._surface_node_list(card, place)
+        inside = np.zeros(len(self.points), dtype=bool)
+        inside[nodes] = True
+        inside[len(self.points) - len(self.parents) :] = True  # centres belong to their face
+        rows = self.outside(np.arange(len(self.cells)))
+        rows = rows[inside[rows].all(axis=1)]
+        lost = np.setdiff1d(nodes[self.used[nodes]], rows)
+        if len(lost) or not len(rows):
+            card.fail(
+                f"{len(lost) or len(nodes)} of {len(nodes)} nodes of this surface belong to no "
+                "element face whose other nodes belong to it as well; define the surface by "
+                "element faces, TYPE=ELEMENT"
+            )
+        return np.asarray(rows)
+
+    # -- sets for supports ---------------------------------------------------------------
+
+    def with_centres(self, nodes: Ints) -> Ints:
+        """Nodes with the added centres whose parents all are among them, ascending."""
+        inside = np.zeros(len(self.points) + 1, dtype=bool)
+        inside[nodes] = True
+        inside[-1] = True  # parent -1: none
+        whole = inside[self.parents].all(axis=1) if len(self.parents) else np.zeros(0, dtype=bool)
+        return np.union1d(nodes, self.n_given + np.flatnonzero(whole))
+
+    def dolfinx_cells(self) -> Ints:
+        """Nodes of the cells in DOLFINx order, shape (n_cells, n_cell_nodes)."""
+        return np.asarray(self.cells[:, to_dolfinx(self.kind.cell, self.kind.order)])
+
+    def nodal(self, values: Array) -> Array:
+        """Values at the deck's nodes extended to the added centres, shape (n_nodes,)."""
+        added = (self.weights * values[np.maximum(self.parents, 0)]).sum(axis=1)
+        return np.concatenate((values, added))
+
+
+_FACTORS = np.array(
+    [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB8669FD5B3],
+    dtype=np.uint64,
+)
+"""Odd numbers with bits all over, for a hash of up to four node numbers."""
+
+
+def _repetitions(rows: Ints) -> Ints:
+    """How often each row occurs, shape (n_rows,).
+
+    Args:
+        rows: Each sorted, shape (n_rows, k), k at most 4.
+    """
+    hashes = (rows.astype(np.uint64) * _FACTORS[: rows.shape[1]]).sum(axis=1, dtype=np.uint64)
+    order = np.argsort(hashes)
+    ordered = hashes[order]
+    same = ordered[1:] == ordered[:-1]
+    if not np.array_equal(rows[order[1:][same]], rows[order[:-1][same]]):
+        ids = row_ids(rows)  # two rows with one hash: it may happen once in a million meshes
+        return np.asarray(np.bincount(ids)[ids])
+    number = np.concatenate(([0], np.cumsum(~same)))
+    out = np.empty(len(rows), dtype=np.int64)
+    out[order] = np.bincount(number)[number]
+    return out
+
+
+def _one_kind(spaces: list[Space]) -> ElementType:
+    """The shape, order and kinematic model that all elements share."""
+    blocks = [b for space in spaces for b in space.elements.values() if len(b.table.labels)]
+    if not blocks:
+        raise DeckError("the deck has no elements that fxcrack can compute; add *ELEMENT")
+    first = blocks[0]
+    for block in blocks[1:]:
+        for what, a, b in (
+            ("kinematic models", first.kind.model, block.kind.model),
+            ("shapes", first.kind.cell, block.kind.cell),
+            ("orders", first.kind.order, block.kind.order),
+        ):
+            if a != b:
+                block.card.fail(
+                    f"{block.kind.name} elements stand beside {first.kind.name} elements "
+                    f"({first.card.place}): all elements must be of one of the {what}; mesh the "
+                    "model with one element shape and order"
+                )
+    return first.kind
+
+
+def _check_nodes(card: Card, labels: Ints, nodes: Ints) -> None:
+    """Refuse elements that have one node twice."""
+    ordered = np.sort(nodes, axis=1)
+    bad = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
+    if len(bad):
+        card.fail(
+            f"{len(bad)} of {len(labels)} elements have a node more than once, the first is "
+            f"element {int(labels[bad[0]])}; degenerate elements are not available: mesh that "
+            "place with whole elements"
+        )

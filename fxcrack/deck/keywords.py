@@ -1,0 +1,271 @@
+"""Which keywords and parameters are read, which have no effect here, and which are refused.
+
+The one table of what is known: a keyword or a parameter that does not stand in it is refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Literal
+
+Kind = Literal["read", "output", "numerics", "refused"]
+
+
+@dataclass(frozen=True)
+class Keyword:
+    """What is known of a keyword.
+
+    Attributes:
+        kind: "read"; "output", ignored; "numerics", a control of another program's solution
+            method, left out and said so; "refused".
+        parameters: Parameters that are read, squeezed.
+        harmless: Parameters that change nothing here.
+        help: For refused ones, what would help.
+    """
+
+    kind: Kind
+    parameters: frozenset[str] = frozenset()
+    harmless: frozenset[str] = frozenset()
+    help: str = ""
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset("".join(word.split()).upper() for word in text.split(",") if word.strip())
+
+
+_READ = {
+    # mesh, sets, surfaces
+    "NODE": ("NSET, INPUT, SYSTEM", ""),
+    "ELEMENT": ("TYPE, ELSET, INPUT", ""),
+    "NSET": ("NSET, GENERATE, ELSET, INSTANCE, UNSORTED", "INTERNAL, INPUT"),
+    "ELSET": ("ELSET, GENERATE, INSTANCE", "INTERNAL, UNSORTED, INPUT"),
+    "NGEN": ("NSET, LINE", ""),
+    "NFILL": ("NSET, BIAS", ""),
+    "NCOPY": ("OLD SET, NEW SET, CHANGE NUMBER, SHIFT, REFLECT, MULTIPLE", ""),
+    "ELGEN": ("ELSET", ""),
+    "ELCOPY": ("OLD SET, NEW SET, ELEMENT SHIFT, SHIFT NODES", ""),
+    "SURFACE": ("NAME, TYPE", "INTERNAL"),
+    "PART": ("NAME", ""),
+    "END PART": ("", ""),
+    "INSTANCE": ("NAME, PART", ""),
+    "END INSTANCE": ("", ""),
+    "ASSEMBLY": ("NAME", ""),
+    "END ASSEMBLY": ("", ""),
+    # sections, materials
+    "SOLID SECTION": ("ELSET, MATERIAL, ORIENTATION", "CONTROLS"),
+    "SHELL SECTION": (
+        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON",
+        "CONTROLS",
+    ),
+    "ORIENTATION": ("NAME, SYSTEM, DEFINITION", ""),
+    "MATERIAL": ("NAME", "SRANGE, RTOL"),
+    "ELASTIC": ("TYPE", "MODULI"),
+    "PLASTIC": ("HARDENING", ""),
+    "EXPANSION": ("TYPE, ZERO", ""),
+    "DENSITY": ("", ""),
+    "HYPERELASTIC": ("NEO HOOKE", "MODULI"),
+    "DAMPING": ("ALPHA, BETA", ""),
+    # interfaces
+    "SURFACE INTERACTION": ("NAME", ""),
+    "FRICTION": ("ROUGH", "LAGRANGE, SLIP TOLERANCE, ELASTIC SLIP"),
+    "SURFACE BEHAVIOR": ("PRESSURE-OVERCLOSURE", "AUGMENTED LAGRANGE, PENALTY, DIRECT"),
+    "CONTACT PAIR": (
+        "INTERACTION, TYPE, ADJUST, TIED, SMALL SLIDING",
+        "EXTENSION ZONE, SMOOTH, HCRIT, SLIDE DISTANCE, MINIMUM DISTANCE, CPSET",
+    ),
+    "CLEARANCE": ("SLAVE, MASTER, SECONDARY, MAIN, VALUE, CPSET", ""),
+    "CONTACT CLEARANCE": (
+        "NAME, ADJUST, CLEARANCE, SEARCH ABOVE, SEARCH BELOW, SEARCH NSET",
+        "",
+    ),
+    "CONTACT CLEARANCE ASSIGNMENT": ("", ""),
+    "TIE": ("NAME, ADJUST, TYPE, POSITION TOLERANCE", "NO ROTATION, NO THICKNESS"),
+    "COUPLING": ("CONSTRAINT NAME, REF NODE, SURFACE", ""),
+    "KINEMATIC": ("", ""),
+    "EQUATION": ("", ""),
+    "RIGID BODY": ("REF NODE, ELSET, TIE NSET, PIN NSET, NSET", "POSITION"),
+    "INITIAL CONDITIONS": ("TYPE, NORMAL", ""),
+    "NODAL ENERGY RATE": ("GENERATE, INPUT", ""),
+    "AMPLITUDE": (
+        "NAME, DEFINITION, TIME, VALUE, FIXED INTERVAL, BEGIN, SMOOTH, INPUT",
+        "",
+    ),
+    # steps
+    "STEP": ("NAME, NLGEOM, INC, AMPLITUDE", "EXTRAPOLATION, UNSYMM, CONVERT SDI, SOLVER"),
+    "END STEP": ("", ""),
+    "STATIC": ("DIRECT, STABILIZE, ALLSDTOL, FACTOR, RIKS", "CONTINUE"),
+    "VISCO": ("DIRECT, CETOL, STABILIZE, ALLSDTOL, FACTOR", "CREEP"),
+    "DYNAMIC": (
+        "ALPHA, APPLICATION, DIRECT, EXPLICIT, HAFTOL, HALFINC SCALE FACTOR",
+        "INITIAL, NOHAF, IMPACT",
+    ),
+    "DIRECT CYCLIC": ("FATIGUE", "CETOL, CONTINUE, DELTMX, TIME POINTS, CRITERION"),
+    "FATIGUE": ("TYPE", "CETOL, DELTMX, DIRECT, TIME POINTS"),
+    "BOUNDARY": ("AMPLITUDE, OP, TYPE, FIXED", "LOAD CASE, REGION TYPE"),
+    "CLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
+    "DLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
+    "DSLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
+    "TEMPERATURE": ("AMPLITUDE, OP", ""),
+    "DEBOND": (
+        "SLAVE, MASTER, SECONDARY, MAIN, DEBONDING FORCE, TIME INCREMENT",
+        "FREQUENCY, OUTPUT",
+    ),
+    "FRACTURE CRITERION": (
+        "TYPE, DISTANCE, NSET, DEPENDENCIES, MIXED MODE BEHAVIOR, NODAL ENERGY RATE, SYMMETRY, "
+        "TOLERANCE, UNSTABLE GROWTH TOLERANCE, VISCOSITY",
+        "",
+    ),
+    "CONTROLS": ("TYPE, PARAMETERS, RESET, ANALYSIS", ""),
+    "INCLUDE": ("INPUT", ""),
+    "PARAMETER": ("", ""),
+}
+
+_OUTPUT = (
+    "HEADING, PREPRINT, PHYSICAL CONSTANTS, OUTPUT, NODE OUTPUT, RESTART, MONITOR, PRINT, "
+    "TIME POINTS, FILTER, FILE FORMAT, FILE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY "
+    "OUTPUT, INCREMENTATION OUTPUT, INTEGRATED OUTPUT, INTEGRATED OUTPUT SECTION, SURFACE "
+    "OUTPUT, MODAL OUTPUT, NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT "
+    "FILE, ENERGY PRINT, ENERGY FILE, SECTION PRINT, SECTION FILE, MODAL PRINT, DIAGNOSTICS, "
+    "USER OUTPUT VARIABLES, CONTOUR INTEGRAL, RADIATE PRINT, NO PRINT, CONDUCTIVITY, SPECIFIC "
+    "HEAT"
+)
+"""Headings, output requests, and material data without effect on stresses."""
+
+_NUMERICS = "CONTACT CONTROLS, SECTION CONTROLS, HOURGLASS STIFFNESS, SOLVER CONTROLS"
+
+_SHELLS = "these shells are not available; use continuum shells (SC8R) or solid elements (C3D20R)"
+_USER = (
+    "user subroutines cannot be run; use a material that fxcrack has (ELASTIC, PLASTIC, "
+    "HYPERELASTIC with NEO HOOKE)"
+)
+_COHESIVE = (
+    "cohesive zones are not available; a crack along the same interface is *DEBOND with a "
+    "*FRACTURE CRITERION"
+)
+_GENERAL = (
+    "general contact is not available; name the surfaces that meet by *CONTACT PAIR and bonded "
+    "ones by *INITIAL CONDITIONS, TYPE=CONTACT"
+)
+_THERMAL = "heat is not computed; prescribe temperatures by *TEMPERATURE"
+_PERTURBATION = "only *STATIC, *VISCO, *DYNAMIC, *DIRECT CYCLIC with FATIGUE and *FATIGUE are"
+
+_REFUSED = {
+    "SHELL GENERAL SECTION": _SHELLS,
+    "TRANSVERSE SHEAR STIFFNESS": _SHELLS,
+    "TRANSVERSE SHEAR": _SHELLS,
+    "NODAL THICKNESS": _SHELLS,
+    "SHELL TO SOLID COUPLING": _SHELLS,
+    "MEMBRANE SECTION": "membranes are not available; use solid elements",
+    "BEAM SECTION": "beams are not available; use solid elements",
+    "BEAM GENERAL SECTION": "beams are not available; use solid elements",
+    "COHESIVE SECTION": _COHESIVE,
+    "COHESIVE BEHAVIOR": _COHESIVE,
+    "DAMAGE INITIATION": _COHESIVE,
+    "DAMAGE EVOLUTION": _COHESIVE,
+    "DAMAGE STABILIZATION": _COHESIVE,
+    "ENRICHMENT": "cracks through elements are not available; let the crack follow surfaces",
+    "ENRICHMENT ACTIVATION": "cracks through elements are not available; give surfaces",
+    "USER MATERIAL": _USER,
+    "DEPVAR": _USER,
+    "USER DEFINED FIELD": _USER,
+    "USER ELEMENT": "user elements cannot be run; use solid elements",
+    "UEL PROPERTY": "user elements cannot be run; use solid elements",
+    "CONTACT": _GENERAL,
+    "CONTACT INCLUSIONS": _GENERAL,
+    "CONTACT EXCLUSIONS": _GENERAL,
+    "CONTACT PROPERTY ASSIGNMENT": _GENERAL,
+    "SURFACE PROPERTY ASSIGNMENT": _GENERAL,
+    "CONTACT INITIALIZATION ASSIGNMENT": _GENERAL,
+    "CONTACT INTERFERENCE": "start from surfaces that meet; interference is not available",
+    "CHANGE FRICTION": "friction stays what it is; give one coefficient for all steps",
+    "MODEL CHANGE": "parts and contact pairs stay in the model in all steps",
+    "GAP": "gap elements are not available; use *CONTACT PAIR",
+    "MASS": "point masses are not available; give the bodies their *DENSITY",
+    "SPRING": "springs are not available; hold or load the bodies themselves",
+    "DASHPOT": "dashpots are not available; use *DAMPING of the material",
+    "CONNECTOR SECTION": "connectors are not available; hold or load the bodies themselves",
+    "MPC": "multi-point constraints are not available; prescribe the displacements",
+    "DISTRIBUTING": (
+        "a coupling that distributes a load is not available; load the surface by *DSLOAD with "
+        "TRVEC, or use *KINEMATIC with a reference node whose motion is prescribed"
+    ),
+    "DISTRIBUTING COUPLING": "load the surface itself by *DSLOAD with TRVEC",
+    "KINEMATIC COUPLING": "write *COUPLING with *KINEMATIC",
+    "EMBEDDED ELEMENT": "embedded elements are not available; mesh them into the body",
+    "PRE-TENSION SECTION": "prescribe the displacement of the bolt's end instead",
+    "SUBMODEL": "prescribe the boundary's displacements by *BOUNDARY",
+    "TRANSFORM": "displacements are along the global axes; turn the model so that they fit",
+    "SYSTEM": "give the nodes in global coordinates",
+    "NMAP": "give the nodes in global coordinates",
+    "FIELD": "field variables are not available; only *TEMPERATURE is",
+    "CREEP": "creep is not available; elastic and plastic materials are",
+    "VISCOELASTIC": "viscoelasticity is not available; elastic and plastic materials are",
+    "RATE DEPENDENT": "plasticity does not depend on the rate here",
+    "DRUCKER PRAGER": "only von Mises plasticity is available",
+    "CONCRETE": "only von Mises plasticity is available",
+    "POTENTIAL": "only isotropic von Mises plasticity is available",
+    "CYCLIC HARDENING": "only isotropic hardening is available",
+    "DEFORMATION PLASTICITY": "use *PLASTIC with a table",
+    "HYPERFOAM": "neo-Hookean bodies are available: *HYPERELASTIC, NEO HOOKE",
+    "BULK VISCOSITY": "it belongs to explicit dynamics, which is not available yet",
+    "FIXED MASS SCALING": "it belongs to explicit dynamics, which is not available yet",
+    "VARIABLE MASS SCALING": "it belongs to explicit dynamics, which is not available yet",
+    "INELASTIC HEAT FRACTION": _THERMAL,
+    "HEAT TRANSFER": _THERMAL,
+    "COUPLED TEMPERATURE-DISPLACEMENT": _THERMAL,
+    "DYNAMIC TEMPERATURE-DISPLACEMENT": _THERMAL,
+    "FREQUENCY": _PERTURBATION,
+    "BUCKLE": _PERTURBATION,
+    "STEADY STATE DYNAMICS": _PERTURBATION,
+    "MODAL DYNAMIC": _PERTURBATION,
+    "SOILS": _PERTURBATION,
+    "LOAD CASE": "write one *STEP for each case",
+    "RIGID SURFACE": "analytical rigid surfaces are not available; mesh a stiff body",
+    "SURFACE SECTION": "surface elements are not available; load element faces by *DSLOAD",
+    "IMPORT": "give the model in this deck; states of other analyses are not imported",
+    "DISTRIBUTION": "give one *SOLID SECTION for each part with properties of its own",
+    "COMPOSITE LAYUP": "give each ply its own elements and *SOLID SECTION",
+    "IMPERFECTION": "give the nodes of the imperfect body",
+}
+
+
+def _squeezed(name: str) -> str:
+    return "".join(name.split()).upper()
+
+
+def _table() -> dict[str, Keyword]:
+    found = {}
+    for name in _OUTPUT.split(","):
+        found[_squeezed(name)] = Keyword("output")
+    for name in _NUMERICS.split(","):
+        found[_squeezed(name)] = Keyword("numerics")
+    for name, text in _REFUSED.items():
+        found[_squeezed(name)] = Keyword("refused", help=text)
+    for name, (parameters, harmless) in _READ.items():
+        found[_squeezed(name)] = Keyword("read", _words(parameters), _words(harmless))
+    return found
+
+
+KEYWORDS = _table()
+"""What is known of each keyword, by its squeezed name."""
+
+TITLES = {_squeezed(name): name for name in [*_READ, *_REFUSED]}
+"""Keywords as users write them, by their squeezed names."""
+
+
+def full_name(keyword: str, parameter: str) -> str:
+    """A parameter's name, of which the deck may give the beginning only (at least three letters).
+
+    Args:
+        keyword: Squeezed.
+        parameter: Squeezed.
+    """
+    known = KEYWORDS.get(keyword)
+    if known is None:
+        return parameter
+    names: Iterable[str] = known.parameters | known.harmless
+    if parameter in names or len(parameter) < 3:
+        return parameter
+    fitting = [name for name in names if name.startswith(parameter)]
+    return fitting[0] if len(fitting) == 1 else parameter

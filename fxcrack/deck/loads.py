@@ -1,0 +1,310 @@
+"""Loads of a deck: concentrated forces, pressures, tractions, body forces, gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.continuum.loads import (
+    AmplitudeLike,
+    BodyForce,
+    Load,
+    PointForce,
+    Pressure,
+    Traction,
+)
+from fxcrack.deck.cards import Card, Row, key, label, squeeze
+from fxcrack.deck.flat import Flat
+from fxcrack.deck.groups import Groups
+from fxcrack.deck.report import Report
+from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track
+
+_BODY = {"BX": 0, "BY": 1, "BZ": 2}
+_KINDS = ("CLOAD", "DLOAD", "DSLOAD")
+
+
+@dataclass(frozen=True)
+class Hydrostatic:
+    """A pressure linear in one coordinate.
+
+    Attributes:
+        axis: The coordinate, 0, 1 or 2.
+        zero: Where the pressure is 0, length.
+        full: Where it is 1, length.
+    """
+
+    axis: int
+    zero: float
+    full: float
+
+    def __call__(self, x: Array) -> Array:
+        """Values at positions of shape (3, n)."""
+        return np.asarray((x[self.axis] - self.zero) / (self.full - self.zero))
+
+
+@dataclass(eq=False)
+class LoadEntry:
+    """A load with its history.
+
+    Attributes:
+        row: The line that defined it last.
+        kind: Keyword of its card.
+        name: Of the set or surface, empty for the whole model.
+        type: P, BX, GRAV, TRVEC, ... or the component of a force.
+        direction: Of gravity and tractions.
+        zero: Coordinates at which a hydrostatic pressure is 0 and has its value.
+        track: What it does.
+        value: Present reference value.
+        curve: Present amplitude.
+        follows: Whether it stays normal to the deformed surface.
+    """
+
+    row: Row
+    kind: str
+    name: str
+    type: str
+    direction: tuple[float, ...] = ()
+    zero: tuple[float, float] = (0.0, 0.0)
+    track: Track = field(default_factory=Track)
+    value: float = 0.0
+    curve: Curve | None = None
+    follows: bool = False
+
+
+class Loads:
+    """The loads of all steps.
+
+    Args:
+        flat: The model.
+        amplitudes: Its amplitudes.
+        report: Takes notes.
+        finite: Whether bodies turn far (NLGEOM).
+    """
+
+    def __init__(self, flat: Flat, amplitudes: Amplitudes, report: Report, finite: bool) -> None:
+        self._flat = flat
+        self._amplitudes = amplitudes
+        self._report = report
+        self._finite = finite
+        self._entries: dict[tuple[str, ...], LoadEntry] = {}
+        self._past: list[Period] = []
+
+    def take(self, cards: Sequence[Card], period: Period) -> None:
+        """Read the load cards of a step and follow every load over it.
+
+        Raises:
+            DeckError: A line cannot be read.
+        """
+        moved: set[tuple[str, ...]] = set()
+        for kind in _KINDS:
+            chosen = [card for card in cards if card.keyword == kind]
+            fresh = [c for c in chosen if c.choose("OP", ("MOD", "NEW"), "MOD") == "NEW"]
+            if fresh and len(fresh) < len(chosen):
+                others = next(c for c in chosen if c not in fresh)
+                others.fail(f"OP=NEW on another *{kind} of the step asks for it on all of them")
+            if fresh:
+                for mark, entry in self._entries.items():
+                    if entry.kind == kind:
+                        entry.value, entry.curve = 0.0, None
+                        moved.add(mark)
+            given: set[tuple[str, ...]] = set()
+            for card in chosen:
+                curve = self._amplitudes.of(card)
+                for row in card.need_rows("node, element set or surface, type, value"):
+                    mark, value = self._read(row)
+                    entry = self._entries[mark]
+                    if mark in given:
+                        if entry.curve is not curve:
+                            row.fail("the same load with two amplitudes in one step; give one")
+                        value += entry.value
+                        self._report.replace(f"the loads on '{entry.name}' are added", card)
+                    entry.row, entry.value, entry.curve = row, value, curve
+                    given.add(mark)
+            moved |= given
+        for mark, entry in self._entries.items():
+            if mark in moved or (entry.curve is not None and entry.curve.total):
+                entry.track.move(period, entry.value, entry.curve)
+            else:
+                entry.track.hold(period)
+        self._past.append(period)
+
+    def _read(self, row: Row) -> tuple[tuple[str, ...], float]:
+        """The load that a line means, and its reference value."""
+        card = row.card
+        if card.keyword == "CLOAD":
+            return self._force(row)
+        name, word = row.text(0), squeeze(row.text(1))
+        if word[-2:] == "NU":
+            row.fail(f"load type {word} needs a user subroutine; give its values")
+        entry = LoadEntry(row, card.keyword, label(name), word)
+        follower = card.word("FOLLOWER", "YES")
+        if card.keyword == "DSLOAD" and word not in ("P", "TRVEC", "HP"):
+            row.fail(f"load type {row.text(1)} is not available on surfaces; P, HP and TRVEC are")
+        if word in ("P", "HP") or (word[:1] == "P" and word[1:].isdigit()) or (
+            word[:2] == "HP" and word[2:].isdigit()
+        ):  # fmt: skip
+            if card.keyword == "DLOAD" and word in ("P", "HP"):
+                row.fail("load type P needs the face of solid elements: P1, P2, ...")
+            entry.follows = self._finite
+            if word[:2] == "HP":
+                entry.zero = (row.number(3), row.number(4))
+                if entry.zero[0] == entry.zero[1]:
+                    row.fail("the two levels of a hydrostatic pressure are the same")
+        elif word == "TRVEC":
+            entry.direction = self._direction(row, 3)
+            if self._finite and follower == "YES":
+                row.fail("a traction that turns with the body is not available; add FOLLOWER=NO")
+        elif word == "GRAV":
+            entry.direction = self._direction(row, 3)
+        elif word not in _BODY or _BODY[word] >= self._flat.kind.gdim:
+            row.fail(
+                f"load type {row.text(1)} is not available; P1 to P6, HP1 to HP6, BX, BY, BZ and "
+                "GRAV are"
+            )
+        mark = (card.keyword, key(name), word, *(f"{d:.12g}" for d in entry.direction))
+        self._entries.setdefault(mark, self._started(entry))
+        return mark, row.number(2)
+
+    def _direction(self, row: Row, start: int) -> tuple[float, ...]:
+        found = np.array([row.number(start + i, 0.0) for i in range(3)])
+        if not found.any():
+            row.fail("the direction of the load is missing; give its components")
+        return tuple(float(c) for c in found / np.linalg.norm(found))
+
+    def _force(self, row: Row) -> tuple[tuple[str, ...], float]:
+        if row.card.has("FOLLOWER"):
+            row.fail("forces that turn with the body are not available")
+        dof = row.whole(1)
+        if not 1 <= dof <= self._flat.kind.gdim:
+            row.fail(
+                f"component {dof} of a force is not available on {self._flat.kind.name} elements, "
+                f"whose nodes have {self._flat.kind.gdim} displacements and no rotations"
+            )
+        nodes = self._flat.nodes(row.card, row.text(0), row.index)
+        if not self._flat.used[nodes].all():
+            row.fail(
+                f"'{row.text(0)}' has a node without elements, on which no force can act; load the "
+                "nodes of the body"
+            )
+        mark = ("CLOAD", key(row.text(0)), str(dof))
+        entry = LoadEntry(row, "CLOAD", label(row.text(0)), str(dof))
+        self._entries.setdefault(mark, self._started(entry))
+        return mark, row.number(2)
+
+    def _started(self, entry: LoadEntry) -> LoadEntry:
+        """The entry, its track 0 in the steps before it was defined."""
+        for period in self._past:
+            entry.track.hold(period)
+        return entry
+
+    def loads(self, groups: Groups, densities: dict[str, float | None]) -> list[Load]:
+        """The loads of the scene.
+
+        Args:
+            groups: Takes the groups they act on.
+            densities: Mass per volume of the cells of each section.
+
+        Raises:
+            DeckError: A load has no place, or gravity acts on a body without density.
+        """
+        out: list[Load] = []
+        titles: set[str] = set()
+        for entry in self._entries.values():
+            if entry.kind != "CLOAD" and not entry.track.zero:
+                out += self._of(entry, groups, densities, titles)
+        return self._forces(groups) + out
+
+    def _forces(self, groups: Groups) -> list[Load]:
+        """Concentrated forces: one load for all components of a set that follow one amplitude."""
+        found: dict[tuple[str, str], tuple[LoadEntry, AmplitudeLike, Array]] = {}
+        for entry in self._entries.values():
+            if entry.kind == "CLOAD" and not entry.track.zero:
+                value, amplitude = entry.track.amplitude()
+                mark = (entry.name, repr(amplitude))
+                zero = np.zeros(self._flat.kind.gdim)
+                force = found.setdefault(mark, (entry, amplitude, zero))[2]
+                force[int(entry.type) - 1] += value
+        out: list[Load] = []
+        for (name, _), (entry, amplitude, force) in found.items():
+            nodes = self._flat.nodes(entry.row.card, name, entry.row.index)
+            where = groups.nodes(name, nodes, words="nodes of the deck")
+            alone = sum(1 for other, _ in found if other == name) == 1
+            axes = "".join("xyz"[i] for i in np.flatnonzero(force))
+            title = name if alone else f"{name}.{axes}"
+            total = tuple((force * len(nodes)).tolist())
+            out.append(PointForce(where, total, amplitude, title))
+        return out
+
+    def _of(
+        self,
+        entry: LoadEntry,
+        groups: Groups,
+        densities: dict[str, float | None],
+        titles: set[str],
+    ) -> list[Load]:
+        value, amplitude = entry.track.amplitude()
+        flat, gdim, card = self._flat, self._flat.kind.gdim, entry.row.card
+
+        def title(name: str) -> str:
+            new, i = name, 2
+            while new in titles:
+                new, i = f"{name} {i}", i + 1
+            titles.add(new)
+            return new
+
+        if entry.kind == "DSLOAD":
+            where = groups.facets(entry.name, flat.surface(card, entry.name, entry.row.index))
+            return [self._on_facets(entry, where, value, amplitude, title(entry.name))]
+        cells = (
+            flat.elements(card, entry.name, entry.row.index)
+            if entry.name
+            else np.arange(len(flat.cells))
+        )
+        if entry.type.lstrip("H")[:1] == "P":
+            face = int(entry.type.lstrip("HP"))
+            rows = flat.faces(card, cells, face, entry.row.index)
+            where = groups.facets(f"{entry.name}.P{face}", rows)
+            return [self._on_facets(entry, where, value, amplitude, title(where))]
+        name = entry.name or "gravity"
+        if entry.type == "GRAV":
+            out: list[Load] = []
+            for section, density in densities.items():
+                if density is None:
+                    entry.row.fail(f"gravity needs the *DENSITY of the material of '{section}'")
+                weight = tuple(value * density * d for d in entry.direction[:gdim])
+                out.append(BodyForce(weight, section, amplitude, title(f"{name} {section}")))
+            if entry.name and len(cells) < len(flat.cells):
+                entry.row.fail("gravity on a part of the model is not available; leave the set out")
+            return out
+        force = np.zeros(gdim)
+        force[_BODY[entry.type]] = value
+        body = groups.cells(entry.name, cells) if entry.name else None
+        return [BodyForce(tuple(force.tolist()), body, amplitude, title(f"{name}.{entry.type}"))]
+
+    def _on_facets(
+        self, entry: LoadEntry, where: str, value: float, amplitude: AmplitudeLike, name: str
+    ) -> Load:
+        if entry.type == "TRVEC":
+            traction = tuple(value * d for d in entry.direction[: self._flat.kind.gdim])
+            return Traction(where, traction, amplitude, name)
+        if entry.type[:2] == "HP":
+            # from the level where it is 0 to that where it has its value
+            axis = self._flat.kind.gdim - 1
+            shape = Hydrostatic(axis, *entry.zero)
+            field = _Scaled(value, shape)
+            return Pressure(where, field, amplitude, name, entry.follows)
+        return Pressure(where, value, amplitude, name, entry.follows)
+
+
+@dataclass(frozen=True)
+class _Scaled:
+    """A number times a function of position."""
+
+    factor: float
+    function: Hydrostatic
+
+    def __call__(self, x: Array) -> Array:
+        return self.factor * self.function(x)

@@ -1,0 +1,254 @@
+"""From the model of a deck to the scene and its steps, as data on one rank."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.loads import Monitor
+from fxcrack.continuum.materials import Plastic
+from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
+from fxcrack.deck.constraints import read_links
+from fxcrack.deck.contact import Contacts
+from fxcrack.deck.flat import Flat
+from fxcrack.deck.groups import Groups
+from fxcrack.deck.loads import Loads
+from fxcrack.deck.model import Family, Model
+from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
+from fxcrack.deck.properties import Sections, read_sections
+from fxcrack.deck.report import Report
+from fxcrack.deck.supports import Boundary
+from fxcrack.deck.thermal import Temperatures
+from fxcrack.deck.tracks import Amplitudes
+from fxcrack.effects import FiniteStrain
+from fxcrack.mesh.raw import RawMesh
+from fxcrack.steps.cycles import Cycles
+
+_IN_STEPS = frozenset(
+    (
+        *("STATIC", "VISCO", "DYNAMIC", "DIRECTCYCLIC", "FATIGUE", "CONTROLS", "BOUNDARY"),
+        *("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "DEBOND", "FRACTURECRITERION"),
+    )
+)
+_IN_MODEL = frozenset(
+    (
+        *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
+        *("EQUATION", "RIGIDBODY", "CLEARANCE", "CONTACTCLEARANCE", "NODALENERGYRATE"),
+        *("CONTACTCLEARANCEASSIGNMENT", "CONTROLS"),
+    )
+)
+
+
+@dataclass(frozen=True)
+class Translated:
+    """A deck in the words of a scene.
+
+    Attributes:
+        arguments: Those of :class:`fxcrack.Scene` but the mesh.
+        steps: The steps.
+        report: What was read and replaced.
+        raw: The mesh.
+    """
+
+    arguments: dict[str, Any]
+    steps: list[DeckStep]
+    report: Report
+    raw: RawMesh
+
+
+def translate(model: Model, report: Report, order: int | None = None) -> Translated:
+    """Translate a model.
+
+    Args:
+        model: What the deck describes.
+        report: Takes what is read and replaced.
+        order: Order the elements are raised to; their own by default.
+
+    Raises:
+        DeckError: Something is missing, contradicts itself or has no word here.
+    """
+    spaces = [model.root, *model.instances.values()]
+    if any(block.kind.stacked for space in spaces for block in space.elements.values()):
+        order = 2
+    flat = Flat(model, order)
+    groups = Groups(flat)
+    cards = _model_cards(flat)
+    procedures = read_procedures(model.steps, report)
+    _check_steps(model.steps)
+    finite = _finite(model.steps, procedures, report)
+    periods = [p.period for p in procedures]
+    amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
+    boundary = Boundary(flat, periods)
+    boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
+    loads = Loads(flat, amplitudes, report, finite)
+    temperatures = Temperatures(flat, report)
+    temperatures.start(_initial(cards, "TEMPERATURE"))
+    contacts = Contacts(cards, flat, groups, report, finite)
+    steps = []
+    for number, (family, procedure) in enumerate(zip(model.steps, procedures, strict=True)):
+        of_step = family.cards
+        boundary.take([c for c in of_step if c.keyword == "BOUNDARY"], amplitudes)
+        boundary.end_step()
+        loads.take(of_step, procedure.period)
+        thermal = [c for c in of_step if c.keyword == "TEMPERATURE"]
+        temperatures.take(thermal, amplitudes, procedure.period)
+        grow = contacts.take(number, of_step)
+        steps.append(DeckStep(family.name, procedure.step, tuple(grow)))
+    sections = read_sections(flat, groups, report)
+    _check_finite(finite, sections, model)
+    supports = boundary.displacements(groups)
+    supports += boundary.link_displacements(read_links(cards, flat), groups)
+    held = np.unique(
+        np.concatenate(
+            [np.zeros(0, dtype=np.int64), *(n for d in range(3) for _, n in boundary.histories(d))]
+        )
+    )
+    debonds, bonds = contacts.build(model.interactions, held)
+    densities = {n: getattr(m, "density", None) for n, m in sections.materials.items()}
+    arguments: dict[str, Any] = {
+        "materials": sections.materials,
+        "model": sections.model,
+        "supports": supports,
+        "loads": loads.loads(groups, densities),
+        "debonds": debonds,
+        "bonds": bonds,
+        "monitors": _monitors(model.steps, flat, groups),
+        "effects": _effects(procedures, sections, temperatures, finite),
+    }
+    raw = groups.raw_mesh()
+    _tell(report, flat, arguments, steps)
+    return Translated(arguments, steps, report, raw)
+
+
+def _model_cards(flat: Flat) -> list[Card]:
+    """Model data, those inside parts refused where they would need the names of a part."""
+    for placed in flat.placed.values():
+        for card in placed.space.others:
+            if placed.space is not flat.model.root and card.keyword in _IN_MODEL:
+                card.fail("it stands inside a part or instance; move it behind *END ASSEMBLY")
+    for card in flat.model.cards:
+        if card.keyword in _IN_STEPS and card.keyword not in _IN_MODEL:
+            card.fail("it belongs into a *STEP")
+    return flat.model.cards
+
+
+def _check_steps(steps: Sequence[Family]) -> None:
+    for family in steps:
+        for card in family.cards:
+            if card.keyword in _IN_MODEL and card.keyword not in _IN_STEPS:
+                card.fail("it is model data; move it before the first *STEP")
+
+
+def _initial(cards: Sequence[Card], kind: str) -> list[Card]:
+    """Initial conditions of a kind; others are refused."""
+    found = []
+    for card in cards:
+        if card.keyword == "INITIALCONDITIONS":
+            given = card.choose("TYPE", ("CONTACT", "TEMPERATURE"), card.text("TYPE"))
+            if given == kind:
+                found.append(card)
+    return found
+
+
+def _finite(steps: Sequence[Family], procedures: Sequence[Procedure], report: Report) -> bool:
+    """Whether bodies turn far; in all steps if in one."""
+    finite = [p.finite for p in procedures]
+    if any(finite) and not all(finite):
+        report.replace(
+            "NLGEOM counts from the first step on: all steps have large rotations, or none",
+            steps[finite.index(True)].card,
+        )
+    return any(finite)
+
+
+def _check_finite(finite: bool, sections: Sections, model: Model) -> None:
+    """Refuse plasticity beside large rotations."""
+    if finite and any(isinstance(m, Plastic) for m in sections.materials.values()):
+        for family in model.materials.values():
+            card = family.first("PLASTIC")
+            if card is not None:
+                card.fail(
+                    "plasticity is for small strain and cannot stand beside NLGEOM=YES; write "
+                    "NLGEOM=NO in all steps, or leave *PLASTIC out"
+                )
+
+
+def _effects(
+    procedures: Sequence[Procedure],
+    sections: Sections,
+    temperatures: Temperatures,
+    finite: bool,
+) -> list[Any]:
+    effects: list[Any] = []
+    if finite:
+        effects.append(FiniteStrain())
+    effects += temperatures.effect(sections.zero)
+    inertia = next((p.inertia for p in procedures if p.inertia is not None), None)
+    if inertia is not None:
+        effects.append(
+            Inertia(alpha_m=inertia.alpha_m, alpha_f=inertia.alpha_f, rayleigh=sections.rayleigh)
+        )
+    return effects
+
+
+def _monitors(steps: Sequence[Family], flat: Flat, groups: Groups) -> list[Monitor]:
+    """Displacements that history output and printed tables ask for, as means over the set."""
+    out: dict[str, Monitor] = {}
+    for family in steps:
+        history = False
+        for card in family.cards:
+            if card.keyword == "OUTPUT":
+                history = card.has("HISTORY")
+            asked = card.keyword == "NODEPRINT" or (card.keyword == "NODEOUTPUT" and history)
+            if not asked or not card.has("NSET"):
+                continue
+            name = card.text("NSET")
+            words = {squeeze(text) for row in card.rows() for text in row.fields}
+            try:
+                nodes = flat.nodes(card, name)
+            except DeckError:
+                continue  # an output request must not stop a deck
+            nodes = nodes[flat.used[nodes]]
+            if not len(nodes):
+                continue
+            for i in range(flat.kind.gdim):
+                if words & {"U", f"U{i + 1}"}:
+                    title = f"U{i + 1} {label(name)}"
+                    direction = tuple(float(i == j) for j in range(flat.kind.gdim))
+                    where = groups.support(card, name, nodes)
+                    out.setdefault(key(title), Monitor(where, direction, title))
+    return list(out.values())
+
+
+def _tell(report: Report, flat: Flat, arguments: dict[str, Any], steps: Sequence[DeckStep]) -> None:
+    """Say what was read."""
+    kind = flat.kind
+    report.read.append(
+        f"{int(flat.used[: flat.n_given].sum())} nodes, {len(flat.cells)} elements {kind.name} "
+        f"({kind.model}, {kind.cell} of order {kind.order})"
+        + (f", {len(flat.parents)} nodes added to the elements" if len(flat.parents) else "")
+    )
+    report.read += [f"material of '{n}': {m}" for n, m in arguments["materials"].items()]
+    report.read.append(f"model: {arguments['model']}")
+    report.read += [f"support: {s}" for s in arguments["supports"]]
+    report.read += [f"load: {x}" for x in arguments["loads"]]
+    for debond in arguments["debonds"]:
+        interface = debond.interface
+        report.read.append(
+            f"debond: slave '{interface.slave}', master '{interface.master}', bonded "
+            f"'{interface.bonded}': {debond.criterion}, {debond.release}"
+        )
+    for interface in arguments["bonds"]:
+        report.read.append(f"interface: slave '{interface.slave}', master '{interface.master}'")
+    report.read += [f"effect: {e}" for e in arguments["effects"]]
+    for step in steps:
+        if isinstance(step.step, Cycles):
+            words = f"cycles of period {step.step.period}, {step.step.n_max:g} of them"
+        else:
+            words = f"{type(step.step).__name__} until time {step.step.ends[0].time:g}"  # type: ignore[union-attr]
+        grows = f", grows: {', '.join(step.grow)}" if step.grow else ""
+        report.read.append(f"step '{step.name}': {words}{grows}")

@@ -1,0 +1,532 @@
+"""``write_deck``: a scene and its steps as a keyword deck, to be checked in another program.
+
+Reading the deck again gives the same history. What a deck has no word for is refused by name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.checks import check_instance, check_list
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.files import replacing
+from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.face import Face
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
+from fxcrack.continuum.loads import (
+    AmplitudeLike,
+    BodyForce,
+    Displacement,
+    Load,
+    Moment,
+    Monitor,
+    PointForce,
+    PointMoment,
+    Pressure,
+    Ramp,
+    Traction,
+)
+from fxcrack.continuum.temperature import Temperature
+from fxcrack.criteria import (
+    AmplitudeRelease,
+    CrackLengthVsTime,
+    CrackOpening,
+    CriticalStress,
+    RampRelease,
+    StepRelease,
+)
+from fxcrack.deck.elements import FACES, added_nodes, element_type, face_nodes, to_dolfinx
+from fxcrack.deck.gather import Gathered, gather
+from fxcrack.deck.lines import broken, number, set_lines
+from fxcrack.deck.procedures import DeckStep
+from fxcrack.deck.write_properties import criterion_lines, material_lines
+from fxcrack.effects import FiniteStrain
+from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.supports import AnySupport
+from fxcrack.mesh.raw import reference
+from fxcrack.scene import Scene
+from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.end_conditions import Time
+from fxcrack.steps.static import Dynamic, Static
+
+_NODES = {
+    "triangle": (3, 6),
+    "quadrilateral": (4, 8),
+    "tetrahedron": (4, 10),
+    "hexahedron": (8, 20),
+}
+
+
+def write_deck(scene: Scene, steps: Sequence[Static | Cycles | DeckStep], path: str | Path) -> None:
+    """Write a scene and its steps as a keyword deck; collective, rank 0 writes.
+
+    Second-order quadrilaterals and hexahedra are written as 8- and 20-node elements, whose centre
+    nodes other programs leave out. Open faces are in contact in a deck.
+
+    Args:
+        scene: The scene, before or after its steps; its input is written, not its state.
+        steps: Static steps by increments that end at a :class:`~fxcrack.Time`, cycles over a
+            period, or steps of a deck.
+        path: The file.
+
+    Raises:
+        InputError: The scene or a step has something that a deck has no word for.
+        FxcrackError: The file could not be written.
+    """
+    check_instance("write_deck", "scene", scene, Scene, "deck.scene")
+    steps = check_list("write_deck", "steps", steps, (Static, Cycles, DeckStep))
+    mesh = gather(scene.mesh)
+    toughness = [_nodal_toughness(d, p) for d, p in zip(scene.debonds, scene.pairs, strict=False)]
+    comm, lines, problem = scene.mesh.comm, [], None
+    try:
+        lines = _Writer(scene, mesh, toughness).lines(steps)
+    except InputError as error:  # rank 0 alone sees the mesh
+        problem = str(error)
+    raise_on_all_ranks(comm, problem)
+    with all_or_none(comm, f"writing {path}"):
+        if comm.rank == 0:
+            with replacing(path) as temporary:
+                temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _nodal_toughness(debond: Debond, pair: Pair) -> Array | None:
+    """Toughness at the slave nodes where it varies along them, shape (n_nodes, 3)."""
+    criterion = debond.criterion
+    given = [getattr(criterion, name, None) for name in ("GIc", "GIIc", "GIIIc")]
+    if not any(callable(v) or np.ndim(v) > 0 for v in given if v is not None):
+        return None
+    n = pair.surface.n_nodes
+    x = pair.surface.x[:, : pair.frames.shape[1]]
+    return np.asarray(criterion.toughness_at(x, np.arange(n), n_slave=n))  # type: ignore[attr-defined]
+
+
+@dataclass
+class _Writer:
+    """Makes the lines; the mesh is on rank 0 only, the others find the same refusals."""
+
+    scene: Scene
+    mesh: Gathered | None
+    toughness: list[Array | None]
+    amplitudes: dict[AmplitudeLike, str] = field(default_factory=dict)
+    sets: list[str] = field(default_factory=list)
+    end: float = 0.0
+
+    def lines(self, steps: Sequence[Static | Cycles | DeckStep]) -> list[str]:
+        """The whole deck."""
+        given = self.scene.input
+        if given.order is not None and given.order != self.scene.mesh.order:
+            _refuse(
+                f"a displacement of order {given.order} on elements of order "
+                f"{self.scene.mesh.order}; make the mesh of that order"
+            )
+        chosen = [s if isinstance(s, DeckStep) else _as_deck_step(self.scene, s, i)
+                  for i, s in enumerate(steps)]  # fmt: skip
+        ends = _ends(chosen)
+        self.end = ends[-1] if ends else 1.0
+        model = [*self._mesh(), *self._properties(), *self._interfaces()]
+        conditions = [*self._supports(), *self._loads()]
+        tail: list[str] = []
+        start = 0.0
+        for i, (step, end) in enumerate(zip(chosen, ends, strict=True)):
+            tail += self._step(step, end - start, conditions if i == 0 else [])
+            start = end
+        return ["*HEADING", f"written by fxcrack: {self.scene.mesh.name}", *model, *self.sets,
+                *self._amplitudes(), *tail]  # fmt: skip
+
+    # -- mesh ----------------------------------------------------------------------------
+
+    def _mesh(self) -> list[str]:
+        model, mesh = self.scene.input.model, self.mesh
+        if mesh is None:
+            return []
+        prefix = {PlaneStrain: "CPE", PlaneStress: "CPS", Axisymmetric: "CAX"}.get(
+            type(model), "C3D"
+        )
+        n = _NODES[mesh.cell][mesh.order - 1]
+        kind = element_type(f"{prefix}{n}")
+        assert not isinstance(kind, str)
+        inverse = np.argsort(to_dolfinx(mesh.cell, mesh.order))
+        cells = mesh.cells[:, inverse]
+        dropped = np.zeros(len(mesh.points), dtype=bool)
+        if kind.serendipity:
+            dropped[cells[:, n:]] = True
+            self._check_centres(cells, kind, mesh)
+        out = ["*NODE"]
+        out += [
+            f"{i + 1}, " + ", ".join(number(c) for c in x)
+            for i, x in enumerate(mesh.points)
+            if not dropped[i]
+        ]
+        out.append(f"*ELEMENT, TYPE={kind.name}, ELSET=ALL_ELEMENTS")
+        for i, row in enumerate(cells[:, :n]):
+            words = [str(i + 1), *(str(node + 1) for node in row)]
+            out += broken(words, 16)
+        for name, (dim, members) in mesh.groups.items():
+            if dim == self.scene.mesh.tdim:
+                out += set_lines("ELSET", name, members)
+            elif dim == self.scene.mesh.tdim - 1:
+                out += self._surface(name, members)
+            elif len(members := members[~dropped[members]]):
+                out += set_lines("NSET", name, members)
+        self._dropped = dropped
+        return out
+
+    @staticmethod
+    def _check_centres(cells: Ints, kind: object, mesh: Gathered) -> None:
+        """Refuse centre nodes that a serendipity element would not put where they are."""
+        n = _NODES[mesh.cell][1]
+        parents, weights = added_nodes(kind)  # type: ignore[arg-type]
+        size = float(np.ptp(mesh.points, axis=0).max())
+        for i, (local, weight) in enumerate(zip(parents, weights, strict=True)):
+            at = np.einsum("k,nkc->nc", weight, mesh.points[cells[:, local]])
+            if np.abs(at - mesh.points[cells[:, n + i]]).max() > 1e-9 * size:
+                _refuse(
+                    "curved elements whose centre nodes are not where an element without them "
+                    "would put them; use straight elements, or triangles and tetrahedra"
+                )
+
+    def _surface(self, name: str, facets: Ints) -> list[str]:
+        """A surface by element sides, from rows (cell, local facet)."""
+        mesh = self.mesh
+        assert mesh is not None
+        sides = _sides(mesh.cell, mesh.order)[facets[:, 1]] if len(facets) else facets[:, 1]
+        out, lines = [], []
+        for side in np.unique(sides):
+            elset = f"_{name}_S{side + 1}"
+            out += set_lines("ELSET", elset, facets[sides == side, 0], ", INTERNAL")
+            lines.append(f'"{elset}", S{side + 1}')
+        return [*out, f'*SURFACE, TYPE=ELEMENT, NAME="{name}"', *lines] if lines else []
+
+    def _nodes_of(self, group: str) -> Ints:
+        """Nodes of a group that the deck has."""
+        mesh = self.mesh
+        if mesh is None:
+            return np.zeros(0, dtype=np.int64)
+        dim, members = mesh.groups[group]
+        tdim = self.scene.mesh.tdim
+        if dim == tdim:
+            members = np.unique(mesh.cells[members])
+        elif dim == tdim - 1:
+            members = self._facet_nodes(members)
+        return np.asarray(members[~self._dropped[members]])
+
+    def _facet_nodes(self, facets: Ints) -> Ints:
+        mesh = self.mesh
+        assert mesh is not None
+        inverse = np.argsort(to_dolfinx(mesh.cell, mesh.order))
+        rows = face_nodes(mesh.cell, mesh.order)[_sides(mesh.cell, mesh.order)[facets[:, 1]]]
+        return np.unique(mesh.cells[facets[:, :1], inverse[rows]])
+
+    # -- properties ----------------------------------------------------------------------
+
+    def _properties(self) -> list[str]:
+        given = self.scene.input
+        materials = given.materials
+        thickness = getattr(given.model, "thickness", None)
+        out: list[str] = []
+        if not isinstance(materials, dict):
+            items = [("ALL_ELEMENTS", materials)]
+        else:
+            items = list(materials.items())
+        for i, (name, material) in enumerate(items):
+            title = f"MATERIAL {i + 1}"
+            lines, orientation = material_lines(title, material)  # type: ignore[arg-type]
+            section = f'*SOLID SECTION, ELSET="{name}", MATERIAL="{title}"'
+            out += lines
+            if orientation:
+                out += orientation
+                section += f', ORIENTATION="{title}"'
+            out += [section, number(thickness) if thickness else ","]
+        return out
+
+    # -- interfaces ----------------------------------------------------------------------
+
+    def _interfaces(self) -> list[str]:
+        out: list[str] = []
+        debonds = list(self.scene.debonds)
+        for i, pair in enumerate(self.scene.pairs):
+            interface = pair.interface
+            debond = debonds[i] if i < len(debonds) else None
+            out += self._interface(pair, interface, debond is not None)
+            rates = self.toughness[i] if debond is not None else None
+            if rates is not None:
+                out.append("*NODAL ENERGY RATE")
+                nodes = self._slave_numbers(pair, np.ones(pair.surface.n_nodes, dtype=bool))
+                out += [
+                    f"{node + 1}, " + ", ".join(number(g) for g in row)
+                    for node, row in zip(nodes, rates, strict=True)
+                    if self.mesh is not None and not self._dropped[node]
+                ]
+        return out
+
+    def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
+        title = interface.title
+        if callable(interface.friction):
+            _refuse(f"interface '{title}': friction as a function of position")
+        slave, master = title, f"{title} master"
+        out: list[str] = []
+        if self.mesh is not None:
+            for name, group in (
+                (slave, _group(interface.slave)), (master, _group(interface.master))
+            ):  # fmt: skip
+                if name != group:
+                    out += self._surface(name, self.mesh.groups[group][1])
+        if not debonds and not interface.contact and pair.bonded[pair.paired].all():
+            return [*out, f'*TIE, NAME="{title}"', f'"{slave}", "{master}"']
+        if not interface.contact:
+            log.warn(
+                "write_deck: interface '%s' has no contact, but open faces of a deck touch", title
+            )
+        adjust = ", ADJUST=0." if interface.gap == "adjust" else ""
+        out += [
+            f'*SURFACE INTERACTION, NAME="{title}"',
+            *([number(pair_thickness)] if (pair_thickness := self._thickness()) else []),
+            *(["*FRICTION", number(float(interface.friction))] if interface.friction else []),
+            f'*CONTACT PAIR, INTERACTION="{title}", SMALL SLIDING{adjust}',
+            f'"{slave}", "{master}"',
+        ]
+        if pair.bonded.any():
+            normal = ", NORMAL" if interface.normal_only else ""
+            name = f"{title} bonded"
+            bonded = np.sort(self._slave_numbers(pair, pair.bonded))
+            if self.mesh is not None:
+                out += set_lines("NSET", name, bonded[~self._dropped[bonded]])
+            out += [
+                f"*INITIAL CONDITIONS, TYPE=CONTACT{normal}",
+                f'"{slave}", "{master}", "{name}"',
+            ]
+        return out
+
+    def _thickness(self) -> float:
+        return float(getattr(self.scene.input.model, "thickness", 0.0))
+
+    def _slave_numbers(self, pair: Pair, chosen: Bools) -> Ints:
+        """Nodes of the input at some slave nodes, in their order."""
+        if self.mesh is None:
+            return np.zeros(0, dtype=np.int64)
+        nodes = self._facet_nodes(self.mesh.groups[_group(pair.interface.slave)][1])
+        gdim = self.mesh.points.shape[1]
+        _, at = cKDTree(self.mesh.points[nodes]).query(pair.surface.x[chosen][:, :gdim])
+        return np.asarray(nodes[at])
+
+    # -- conditions ----------------------------------------------------------------------
+
+    def _amplitude(self, amplitude: AmplitudeLike) -> str:
+        """Name of an amplitude."""
+        return self.amplitudes.setdefault(amplitude, f"AMPLITUDE {len(self.amplitudes) + 1}")
+
+    def _amplitudes(self) -> list[str]:
+        out = []
+        for amplitude, name in self.amplitudes.items():
+            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME')
+            times = [0.0, self.end] if isinstance(amplitude, Ramp) else list(amplitude.times)
+            values = times if isinstance(amplitude, Ramp) else list(amplitude.values)
+            if times[0] > 0.0:
+                times, values = [0.0, *times], [values[0], *values]
+            words = [number(x) for pair in zip(times, values, strict=True) for x in pair]
+            out += broken(words, 8, comma=False)
+        return out
+
+    def _name_nodes(self, name: str, group: str) -> None:
+        """Make a set of a group's nodes under a name of the history."""
+        nodes = self._nodes_of(group)
+        if self.mesh is None or (name == group and self.mesh.groups[group][0] == 0):
+            return
+        lines = set_lines("NSET", name, nodes)
+        if lines[0] not in self.sets:
+            self.sets += lines
+
+    def _supports(self) -> list[str]:
+        cards: list[str] = []
+        for support in self.scene.input.supports:
+            self._name_nodes(support.title, support.where)
+            cards += self._support(support)
+        return cards
+
+    def _support(self, support: AnySupport) -> list[str]:
+        if not isinstance(support, Displacement):
+            _refuse(f"the support {type(support).__name__}('{support.title}')")
+        held, moved = [], []
+        for i, value in enumerate((support.x, support.y, support.z)):
+            if value is None:
+                continue
+            if callable(value):
+                _refuse(f"support '{support.title}' as a function of position")
+            line = f'"{support.title}", {i + 1}, {i + 1}'
+            if value == 0.0:
+                held.append(line)
+            else:
+                moved.append(f"{line}, {number(float(value))}")
+        name = self._amplitude(support.amplitude) if moved else ""
+        return [
+            *(["*BOUNDARY", *held] if held else []),
+            *([f'*BOUNDARY, AMPLITUDE="{name}"', *moved] if moved else []),
+        ]
+
+    def _loads(self) -> list[str]:
+        out: list[str] = []
+        for load in self.scene.input.loads:
+            out += self._load(load)
+        return out
+
+    def _load(self, load: Load) -> list[str]:
+        if isinstance(load, Moment | PointMoment):
+            _refuse(f"the load {type(load).__name__}('{load.title}')")
+        name = self._amplitude(load.amplitude)
+        title = load.title
+        values = load.value if isinstance(load.value, tuple | list) else [load.value]
+        if any(callable(v) for v in values):
+            _refuse(f"load '{title}' as a function of position")
+        numbers = [float(v) for v in values]  # type: ignore[arg-type]
+        if isinstance(load, PointForce):
+            n = max(len(self._nodes_of(load.where)), 1)
+            self._name_nodes(title, load.where)
+            return [
+                f'*CLOAD, AMPLITUDE="{name}"',
+                *(f'"{title}", {i + 1}, {number(v / n)}' for i, v in enumerate(numbers) if v),
+            ]
+        if isinstance(load, BodyForce):
+            if load.where is not None and self.mesh is None:
+                return []
+            words = [f"{f'{chr(34)}{load.where}{chr(34)}' if load.where else ''}, B{'XYZ'[i]}, "
+                     f"{number(v)}" for i, v in enumerate(numbers) if v]  # fmt: skip
+            return [f'*DLOAD, AMPLITUDE="{name}"', *words]
+        if title != load.where and self.mesh is not None:
+            self.sets += self._surface(title, self.mesh.groups[_group(load.where)][1])
+        if isinstance(load, Pressure):
+            finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
+            if load.follows != finite:
+                _refuse(
+                    f"pressure '{title}' with follows={load.follows} and "
+                    f"{'' if finite else 'no '}FiniteStrain: in a deck pressures follow if, and "
+                    "only if, rotations are large"
+                )
+            return [f'*DSLOAD, AMPLITUDE="{name}"', f'"{title}", P, {number(numbers[0])}']
+        assert isinstance(load, Traction)
+        size = float(np.linalg.norm(numbers))
+        direction = ", ".join(number(v / size) for v in numbers)
+        return [
+            f'*DSLOAD, AMPLITUDE="{name}", FOLLOWER=NO',
+            f'"{title}", TRVEC, {number(size)}, {direction}',
+        ]
+
+    # -- steps ---------------------------------------------------------------------------
+
+    def _step(self, step: DeckStep, length: float, conditions: list[str]) -> list[str]:
+        what = step.step
+        finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
+        for effect in self.scene.input.effects:
+            if isinstance(effect, Temperature | Inertia):
+                _refuse(f"the effect {type(effect).__name__}")
+        nlgeom = "YES" if finite else "NO"
+        count = what.max_increments if isinstance(what, Static) else 100
+        out = [f'*STEP, NAME="{step.name}", NLGEOM={nlgeom}, INC={count}']
+        if isinstance(what, Cycles):
+            n_max = number(what.n_max) if np.isfinite(what.n_max) else "1e12"
+            out += ["*DIRECT CYCLIC, FATIGUE", f"{number(0.1 * length)}, {number(length)}",
+                    f", , {n_max}"]  # fmt: skip
+        else:
+            sizes = (what.initial, length, what.minimum, min(what.maximum, length))
+            out += ["*STATIC", ", ".join(number(x) for x in sizes)]
+            if what.linear_scaling is not None:
+                out += ["*CONTROLS, TYPE=VCCT LINEAR SCALING", number(what.linear_scaling)]
+            out += [
+                "*CONTROLS, PARAMETERS=TIME INCREMENTATION",
+                f", , , , , , , {what.max_cutbacks}",
+                f", {number(what.cutback)}, , , , , {number(what.growth)}",
+            ]
+        out += conditions
+        for i, debond in enumerate(self.scene.debonds):
+            if debond.interface.title in step.grow:
+                out += self._debond(debond, self.toughness[i] is not None)
+        monitors = [line for m in self.scene.input.monitors for line in self._monitor(m)]
+        if monitors:
+            out += ["*OUTPUT, HISTORY", *monitors]
+        return [*out, "*END STEP"]
+
+    def _monitor(self, monitor: Monitor) -> list[str]:
+        axes = np.flatnonzero(monitor.direction)
+        if len(axes) != 1 or self.mesh is None or self.mesh.groups[monitor.where][0] != 0:
+            return []
+        return [f'*NODE OUTPUT, NSET="{monitor.where}"', f"U{axes[0] + 1}"]
+
+    def _debond(self, debond: Debond, nodal: bool) -> list[str]:
+        title, release = debond.interface.title, debond.release
+        head = f'*DEBOND, SLAVE="{title}", MASTER="{title} master", FREQUENCY=1'
+        lines: list[str] = []
+        old = isinstance(debond.criterion, CriticalStress | CrackOpening | CrackLengthVsTime)
+        if isinstance(release, AmplitudeRelease):
+            pairs = zip(release.times, release.fractions, strict=True)
+            lines = broken([number(x) for pair in pairs for x in pair], 8, comma=False)
+            if release.first_increment is not None:
+                head += f", TIME INCREMENT={number(release.first_increment)}"
+        elif isinstance(release, RampRelease) and release.increments is None and not old:
+            head += ", DEBONDING FORCE=RAMP"
+        elif not isinstance(release, StepRelease):
+            _refuse(f"interface '{title}': the release law {release}")
+        if debond.temperature is not None or debond.watch:
+            _refuse(f"interface '{title}': temperature= and watch= of a Debond")
+        return [head, *lines, *criterion_lines(title, debond.criterion, nodal)]
+
+
+def _group(face: str | Face) -> str:
+    """Name of the group of facets of a side of an interface."""
+    if isinstance(face, str):
+        return face
+    _refuse("the face of a shell")
+
+
+def _refuse(what: str) -> NoReturn:
+    raise InputError(f"write_deck: {what}: a deck has no word for it")
+
+
+def _as_deck_step(scene: Scene, step: Static | Cycles, i: int) -> DeckStep:
+    return DeckStep(f"step {i + 1}", step, tuple(d.interface.title for d in scene.debonds))
+
+
+def _ends(steps: Sequence[DeckStep]) -> list[float]:
+    """Total time at the end of each step.
+
+    Raises:
+        InputError: A step does not end at a time, or proceeds in another way than by increments.
+    """
+    out: list[float] = []
+    for step in steps:
+        what = step.step
+        if isinstance(what, Cycles):
+            start = out[-1] if out else 0.0
+            if what.period is None or what.period[0] != start or what.ends:
+                _refuse(f"cycles {what} without a period that begins at time {start:g}")
+            assert what.period is not None
+            out.append(what.period[1])
+            continue
+        if isinstance(what, Dynamic) or what.stepping != "increment":
+            _refuse(
+                f"step '{step.name}' with stepping='{what.stepping}'"
+                f"{' (Dynamic)' if isinstance(what, Dynamic) else ''}, use stepping='increment'"
+            )
+        times = [e.time for e in what.ends if isinstance(e, Time)]
+        if len(times) != 1 or len(what.ends) != 1:
+            _refuse(f"step '{step.name}' that does not end at a Time alone")
+        out.append(times[0])
+    return out
+
+
+def _sides(cell: str, order: int) -> Ints:
+    """Number of the deck's face, from 0, of each local facet of DOLFINx."""
+    tdim = 2 if cell in ("triangle", "quadrilateral") else 3
+    perm = to_dolfinx(cell, order)
+    closures = reference(cell, order).entity_closure_dofs[tdim - 1]
+    n = len(FACES[cell][0])
+    faces = [set(face) for face in FACES[cell]]
+    return np.array([faces.index({int(perm[i]) for i in c[:n]}) for c in closures])
