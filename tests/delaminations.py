@@ -37,10 +37,12 @@ def strip(
     half_span: float,
     per_ply: int = 0,
     enf: bool = False,
+    lever: float | None = None,
 ) -> fx.Scene:
     """A strip 1 wide, x along, y upwards, cracked for x < a; unit load down at mid-span.
 
     SLB: the upper arm alone rests on the left support. ENF: the lower one does, faces in contact.
+    MMB: that with a ``lever`` c, which lifts the cracked end by c/L and presses by (c + L)/L.
     ``per_ply``: solid cells for each ply; 0: one continuum shell per arm.
     """
     x = np.arange(round(2 * half_span / dx) + 1) * dx
@@ -58,6 +60,7 @@ def strip(
             (x, x), (lines[0], lines[1]), (np.array([0.0, 1.0]),), cell="hexahedron", order=2
         )
         model.group("load", above.part(x=half_span, y=float(lines[0][-1])))
+        model.group("lifted", above.part(x=0.0, y=float(lines[0][-1])))
         rest, level = (below, float(lines[1][0])) if enf else (above, 0.0)
         model.group("left", rest.part(x=0.0, y=level))
         model.group("right", rest.part(x=2 * half_span, y=level))
@@ -77,6 +80,12 @@ def strip(
             "upper": fx.ContinuumShell(upper, "upper_face", "top", axis=(1, 0, 0)),
             "lower": fx.ContinuumShell(lower, "bottom", "lower_face", axis=(1, 0, 0)),
         }
+    loads = [fx.PointForce("load", (0.0, -1.0, 0.0))]
+    if lever is not None:
+        loads = [
+            fx.PointForce("lifted", (0.0, lever / half_span, 0.0)),
+            fx.PointForce("load", (0.0, -(lever + half_span) / half_span, 0.0)),
+        ]
     slave, master = ("upper_face", "lower_face") if enf else ("lower_face", "upper_face")
     bond = fx.Interface(
         slave=slave, master=master, bonded=lambda x: x[0] >= a - 1e-9, contact=enf, name="bond"
@@ -90,7 +99,7 @@ def strip(
             fx.Displacement("right", x=0.0, y=0.0),
             fx.Displacement("side", z=0.0),
         ],
-        loads=[fx.PointForce("load", (0.0, -1.0, 0.0))],
+        loads=loads,
         debonds=[fx.Debond(bond, fx.VCCT(GIc=1e9))],
     )
     scene.run(fx.Static(until=fx.Time(1.0)), progress=False)

@@ -479,8 +479,6 @@ def test_faults_of_the_scene() -> None:
     mesh = thin_body((2, 2), (1.0, 1.0), 0.1, flat, order=1)
     with pytest.raises(InputError, match=r"Scene\(order=2\)"):
         Continuum(mesh, plate(), fx.Solid())
-    with pytest.raises(InputError, match="temperature"):
-        Continuum(mesh, plate(), fx.Solid(), order=2, temperature=fx.Temperature(20.0))
     with pytest.raises(InputError, match="is plane"):
         Continuum(dcb_2d(MPI.COMM_SELF, dx=10.0), plate(), fx.PlaneStrain(), order=2)
     tetrahedra = dcb_3d(MPI.COMM_SELF, dx=10.0, cell="tetrahedron")

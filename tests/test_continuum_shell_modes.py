@@ -13,6 +13,7 @@ from mpi4py import MPI
 from scipy.optimize import brentq
 
 import fxcrack as fx
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.meshes.dcb import dcb_3d
 
 pytestmark = pytest.mark.verification
@@ -59,6 +60,23 @@ def test_one_cell_per_arm(case: str) -> None:
     # a tenth of a per cent: the digits of the reference
     assert total / SOLIDS[case][0] - 1.0 == pytest.approx(lack, abs=1.5e-3)
     assert second == pytest.approx(share, abs=1.5e-3)
+    scene.close()
+
+
+@pytest.mark.quick("42.0-0.02")
+@pytest.mark.parametrize(("lever", "total_lack"), [(30.0, 0.028), (42.0, 0.020), (80.0, 0.012)])
+def test_mixed_mode_bending(lever: float, total_lack: float) -> None:
+    """Against ASTM D6671 with cells 2.5 long: G within 3 %, G_I within 0.6 %.
+
+    G_II lacks 3.6 %; solids, 4 cells over an arm and 1 long, lack 1.5 % of it.
+    """
+    beam = CorrectedBeam(E=139.4e3, E22=10.16e3, G=4.6e3, h=1.5, b=1.0)
+    scene = strip(plain(1.5), plain(1.5), dx=2.5, a=35.0, half_span=50.0, enf=True, lever=lever)
+    total, second = rates(scene)
+    one, two = beam.mmb_rates(35.0, 1.0, lever, 50.0)
+    assert total / (one + two) == pytest.approx(1.0 - total_lack, abs=2e-3)
+    assert total * (1.0 - second) == pytest.approx(one, rel=6e-3)
+    assert total * second / two == pytest.approx(0.9635, abs=2e-3)
     scene.close()
 
 

@@ -25,6 +25,7 @@ from fxcrack.demos import (
     moment_dcb,
     penny,
     pinch,
+    shell_dcb,
     thermal_bilayer,
     two_cracks,
 )
@@ -101,6 +102,15 @@ def test_dcb3d_front_bows():
     scene = dcb3d.grow(dx=0.5, dy=1.25, ny=2, until=34.0)
     assert dcb3d.bow(scene) > 0.0
     assert balanced(scene.history)
+
+
+def test_shell_dcb_is_close_to_the_solids_with_long_cells():
+    """Against a coarser reference than the demo's: second-order solids, 2 per arm, 2.5 long."""
+    reference = shell_dcb.solve(shell_dcb.Model(False, 2.5, 5.0, ny=2, coarse=2.5))
+    found = shell_dcb.solve(shell_dcb.Model(True, 5.0, 5.0, coarse=10.0))
+    load, rate, strip = shell_dcb.beside(found, reference)
+    assert abs(load) < 0.02 and abs(rate) < 0.02 and strip < 0.02  # the required 2 %
+    assert found["unknowns"] < 0.25 * reference["unknowns"]
 
 
 def test_enhanced_dcb_spends_the_propagation_toughness():

@@ -242,11 +242,6 @@ class Continuum:
                 f"ContinuumShell of '{name}': its displacement is of second order (27 nodes); give "
                 "Scene(order=2), or mesh with second-order cells where the shell is curved"
             )
-        if self.temperature is not None:
-            raise InputError(
-                f"ContinuumShell of '{name}': temperature is not known to continuum shells yet; "
-                "model the group with solid cells (laminate.layers), or leave Temperature out"
-            )
 
     def _moduli(self, i: int) -> tuple[Any, Any]:
         """Stiffness on the strains of the model, and all its stresses per unit strain."""

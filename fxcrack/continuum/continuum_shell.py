@@ -96,6 +96,13 @@ class ContinuumShell:
         """Mass per volume; ``None`` where a ply has none."""
         return self.laminate.density
 
+    def thermal_expansion(self) -> Array:
+        """Mean thermal strain per degree in laminate axes, shape (6,), 1/temperature."""
+        plies = self.laminate.plies
+        return np.asarray(sum(p.thickness * p.thermal_expansion() for p in plies)) / (
+            self.laminate.thickness
+        )
+
     def stiffness(self) -> Array:
         """Refuse: the stiffness, shape (6, 6), is that of a place in a cell.
 

@@ -46,6 +46,9 @@ class Elastic(StoringTerm):
         for i in self._parts:
             stiffness, _, dx = c.parts[i]
             e = strain
+            if i in c.shell_cells and c.temperature is not None:
+                total += self._shell_energy(i, strain) * c.weight * dx
+                continue
             if c.temperature is not None:
                 rise = c.temperature.rise
                 stiffness = whole_stiffness(c, i)
@@ -54,6 +57,23 @@ class Elastic(StoringTerm):
                     e -= rise**2 / 2 * square_expansion(c, i)
             total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
         return total
+
+    def _shell_energy(self, i: int, strain: Any) -> Any:
+        """Strain energy per volume of a continuum shell at a temperature, UFL.
+
+        (e - e_th) : C : (e - e_th)/2 multiplied out: the moments of the plies are those of C, C a
+        and a C a.
+        """
+        c = self._continuum
+        assert c.temperature is not None
+        cells, rise = c.shell_cells[i], c.temperature.rise
+        first, second, products = cells.thermal
+        held, stored = rise * first, rise**2 * products[0]
+        if self.finite:
+            held += rise**2 / 2 * second
+            stored += rise**3 * products[1] + rise**4 / 4 * products[2]
+        elastic = 0.5 * ufl.inner(ufl.dot(cells.stiffness, strain), strain)
+        return elastic - ufl.inner(held, strain) + 0.5 * stored
 
     def stresses(self, u: fem.Function) -> list[tuple[Any, Any]]:
         """Cauchy stress; of a finite strain F S F^t/J.

@@ -349,13 +349,49 @@ class Laminate:
             c_i in laminate axes, shape (degree + 1, 6, 6), force/length^2; exactly 0 where
             round-off alone remains.
         """
+        return self._fitted([p.stiffness() for p in self.plies], degree)
+
+    def thermal_polynomials(self, degree: int) -> tuple[Array, Array, Array]:
+        """What thermal strain adds to the energy over the thickness, as such polynomials.
+
+            e_th = a rise + A rise^2/2,      a: expansion, A: the square of its tensor
+
+        Args:
+            degree: Highest power of zeta.
+
+        Returns:
+            C a and C A in laminate axes, shapes (degree + 1, 6), force/length^2/temperature (and
+            its square), and (a C a, a C A, A C A), shape (degree + 1, 3).
+        """
+        first, second, products = [], [], []
+        for ply in self.plies:
+            c, a = ply.stiffness(), ply.thermal_expansion()
+            square = square_strain(a)
+            first.append(c @ a)
+            second.append(c @ square)
+            products.append(np.array([a @ c @ a, a @ c @ square, square @ c @ square]))
+        found = [self._fitted(values, degree) for values in (first, second, products)]
+        return found[0], found[1], found[2]
+
+    def _fitted(self, values: list[Array], degree: int) -> Array:
+        """Polynomial over the thickness with the moments of values that are even in each ply.
+
+        Args:
+            values: One array per ply, all of one shape.
+            degree: Highest power of zeta.
+
+        Returns:
+            Shape (degree + 1, ...); exactly 0 where round-off alone remains.
+        """
         powers = np.arange(degree + 1)
-        moments = self.moments(degree) / (self.thickness ** (powers + 1))[:, None, None]
+        moments = self._integrals(values, degree, 0.0)
+        scale = self.thickness ** (powers + 1)
+        moments /= scale.reshape(-1, *[1] * np.ndim(values[0]))
         k = powers[:, None] + powers[None] + 1
         gram = (0.5**k - (-0.5) ** k) / k
         c = np.tensordot(np.linalg.inv(gram), moments, axes=1)
         c[np.abs(c) <= _ROUND_OFF * np.abs(c).max()] = 0.0
-        first, *others = (p.stiffness() for p in self.plies)
+        first, *others = values
         if all(np.abs(o - first).max() <= _ROUND_OFF * np.abs(first).max() for o in others):
             c[1:] = 0.0
         return c
@@ -445,6 +481,15 @@ def _as_ply(i: int, given: Ply | float, material: Material | None, thickness: fl
             "Isotropic or Orthotropic"
         )
     return ply
+
+
+def square_strain(a: Array) -> Array:
+    """Square of a strain as a tensor, both in Voigt order with engineering shears, shape (6,)."""
+    t = np.array(
+        [[a[0], a[5] / 2, a[4] / 2], [a[5] / 2, a[1], a[3] / 2], [a[4] / 2, a[3] / 2, a[2]]]
+    )
+    s = t @ t
+    return np.array([s[0, 0], s[1, 1], s[2, 2], 2 * s[1, 2], 2 * s[0, 2], 2 * s[0, 1]])
 
 
 def _plane_stress(c: Array) -> Array:

@@ -10,6 +10,7 @@ discontinuous first-order space; nothing depends on how the nodes of a cell are 
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
@@ -210,18 +211,36 @@ class ShellCells:
         factor = np.sqrt(np.array([1.0, 1.0, 1.0, k23, k13, 1.0]))
         layers = [p.polynomial(_DEGREE) * np.outer(factor, factor) for p in self.layers]
         powers = [i for i in range(_DEGREE + 1) if any(c[i].any() for c in layers)]
+        return [(i, self._field([c[i] for c in layers])) for i in powers]
+
+    def _field(self, layers: list[Array]) -> Any:
+        """Values of each layer of cells, all of one shape, as a UFL coefficient."""
         domain, on = self._mesh.domain, self.stacking
         if all(np.allclose(c, layers[0], rtol=1e-12, atol=0.0) for c in layers):
-            return [(i, fem.Constant(domain, np.ascontiguousarray(layers[0][i]))) for i in powers]
-        element = basix.ufl.element("DG", "hexahedron", 0, shape=(6, 6))
+            return fem.Constant(domain, np.ascontiguousarray(layers[0]))
+        element = basix.ufl.element("DG", "hexahedron", 0, shape=layers[0].shape)
         space = fem.functionspace(domain, element)
-        found = []
-        for i in powers:
-            c = fem.Function(space)
-            of_layer = np.array([m[i].ravel() for m in layers])
-            c.x.array.reshape(-1, 36)[_dofs_of(space, on.cells)] = of_layer[on.layer]
-            found.append((i, c))
+        found = fem.Function(space)
+        of_layer = np.array([c.ravel() for c in layers])
+        by_cell = found.x.array.reshape(-1, of_layer.shape[1])
+        by_cell[_dofs_of(space, on.cells)] = of_layer[on.layer]
         return found
+
+    @cached_property
+    def thermal(self) -> tuple[Any, Any, Any]:
+        """What thermal strain adds to the energy, UFL, at a place in a cell.
+
+        C a and C A in global axes, shape (6,), and (a C a, a C A, A C A), shape (3,); see
+        :meth:`fxcrack.Laminate.thermal_polynomials`.
+        """
+        of_layers = [p.thermal_polynomials(_DEGREE) for p in self.layers]
+        found = []
+        for which in range(3):
+            layers = [p[which] for p in of_layers]
+            powers = [i for i in range(_DEGREE + 1) if any(c[i].any() for c in layers)] or [0]
+            found.append(sum(self.zeta**i * self._field([c[i] for c in layers]) for i in powers))
+        turn = ufl.transpose(self.strain_rotation)
+        return ufl.dot(turn, found[0]), ufl.dot(turn, found[1]), found[2]
 
     def measure(self, dx: Any, tags: dict[int, int]) -> WeightedMeasure:
         """The partially reduced measure of the cells.

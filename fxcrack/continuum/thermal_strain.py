@@ -21,6 +21,7 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStress
+from fxcrack.continuum.laminate import square_strain
 from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.temperature import ByTemperature, expansion_of
@@ -75,7 +76,7 @@ def load_form(continuum: Continuum, load: ThermalLoad, v: Any) -> Any:
     strain = whole(continuum.model, continuum.model.strain(v, continuum.x))
     total = 0
     for i, (_, _, dx) in enumerate(continuum.parts):
-        stress = ufl.dot(whole_stiffness(continuum, i), expansion(continuum, i))
+        stress = thermal_stress(continuum, i)
         total += field.patterns[load.pattern] * ufl.inner(stress, strain) * continuum.weight * dx
     return total
 
@@ -95,8 +96,11 @@ def held_energies(continuum: Continuum) -> Array:
     first, second = (fem.Function(field.rise.function_space) for _ in range(2))
     total = 0
     for i, (_, _, dx) in enumerate(continuum.parts):
-        e = expansion(continuum, i)
-        density = ufl.inner(ufl.dot(whole_stiffness(continuum, i), e), e)
+        if i in continuum.shell_cells:
+            density = continuum.shell_cells[i].thermal[2][0]
+        else:
+            e = expansion(continuum, i)
+            density = ufl.inner(ufl.dot(whole_stiffness(continuum, i), e), e)
         total += first * second * density * continuum.weight * dx
     form = fem.form(total)
     for k in range(n):
@@ -137,17 +141,19 @@ def expansion(continuum: Continuum, i: int) -> Any:
     return continuum.by_temperature(i, lambda m: expansion_of(m)[keep])
 
 
+def thermal_stress(continuum: Continuum, i: int) -> Any:
+    """Stress per degree that holds a part, components of :func:`whole`, UFL."""
+    if i in continuum.shell_cells:
+        return continuum.shell_cells[i].thermal[0]
+    return ufl.dot(whole_stiffness(continuum, i), expansion(continuum, i))
+
+
 def square_expansion(continuum: Continuum, i: int) -> Any:
     """Square of the expansion as a tensor, components of :func:`whole`, UFL."""
     keep = [0, 1, 5] if isinstance(continuum.model, PlaneStress) else list(range(6))
 
     def square(m: Material) -> Array:
-        a = expansion_of(m)
-        t = np.array(
-            [[a[0], a[5] / 2, a[4] / 2], [a[5] / 2, a[1], a[3] / 2], [a[4] / 2, a[3] / 2, a[2]]]
-        )
-        s = t @ t
-        return np.array([s[0, 0], s[1, 1], s[2, 2], 2 * s[1, 2], 2 * s[0, 2], 2 * s[0, 1]])[keep]
+        return square_strain(expansion_of(m))[keep]
 
     return continuum.by_temperature(i, square)
 
@@ -160,6 +166,9 @@ def whole_stress(continuum: Continuum, i: int, strain: Any) -> Any:
     """All stresses (``model.stress_labels``) of a part at a small strain and the present field."""
     field = _field_of(continuum)
     model = continuum.model
+    if i in continuum.shell_cells:
+        cells = continuum.shell_cells[i]
+        return ufl.dot(cells.stiffness, strain) - field.rise * cells.thermal[0]
     elastic = whole(model, strain) - field.rise * expansion(continuum, i)
     s = ufl.dot(whole_stiffness(continuum, i), elastic)
     if isinstance(model, PlaneStress):

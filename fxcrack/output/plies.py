@@ -1,9 +1,11 @@
 """Strain and stress of each ply of a continuum shell, and its section forces, after a run.
 
-A cell holds its plies as one stiffness over the thickness, with the moments of the plies; the
-strains are those of its displacement, continuous over the thickness, and each ply's stress follows
-from its own stiffness. Values are means over the 2 x 2 points in the plane of a cell at which it is
-integrated and where they are most accurate.
+A cell holds its plies as one stiffness over the thickness, with the moments of the plies. Strains
+in the plane and shears across it are those of the displacement of the cell, continuous over the
+thickness. Across the plies it is the normal stress that is continuous: that of the cell, linear
+over the thickness (its moments of order 0 and 1), and the strain of each ply follows from it. Each
+ply's stress is that of its own stiffness. Values are means over the 2 x 2 points in the plane of a
+cell at which it is integrated and where they are most accurate.
 """
 
 from __future__ import annotations
@@ -23,7 +25,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.continuum.kinematics import green_lagrange
-from fxcrack.continuum.laminate import Laminate
+from fxcrack.continuum.laminate import Laminate, square_strain
 from fxcrack.continuum.shell_cells import ShellCells
 from fxcrack.output.fields import displacement_function
 from fxcrack.solvers.newton import NewtonSolver
@@ -42,7 +44,8 @@ class PlyResults:
     One row for each ply of each cell, cells in input order, plies from the bottom. The second axis
     of positions, strains and stresses is the place in the ply: bottom, middle, top. Voigt order
     11, 22, 33, 23, 13, 12 in the axes of the ply, engineering shears. At finite strain these are
-    the Green-Lagrange strain and the second Piola-Kirchhoff stress. Stresses 23 and 13 carry the
+    the Green-Lagrange strain and the second Piola-Kirchhoff stress. Strains are whole, with the
+    thermal ones. Stresses 23 and 13 carry the
     shear factors: their integral over the thickness is the shear force, their distribution is not
     that of equilibrium.
 
@@ -137,7 +140,13 @@ def _evaluated(analysis: Analysis, cells: ShellCells, u: fem.Function, finite: b
     if finite:
         strain = green_lagrange(continuum.model, u, continuum.x)
     local = ufl.dot(cells.strain_rotation, strain)
-    wanted = ufl.as_vector([*(local[i] for i in range(6)), *(continuum.x[i] for i in range(3))])
+    rise: Any = 0 * continuum.x[0]
+    if continuum.temperature is not None:
+        continuum.temperature.set(analysis.time)
+        rise = continuum.temperature.rise
+    wanted = ufl.as_vector(
+        [*(local[i] for i in range(6)), *(continuum.x[i] for i in range(3)), rise]
+    )
     domain, on = continuum.mesh.domain, cells.stacking
     owned = on.cells < domain.topology.index_map(3).size_local
     original = np.asarray(compat.original_cell_index(domain), dtype=np.int64)
@@ -151,8 +160,8 @@ def _evaluated(analysis: Analysis, cells: ShellCells, u: fem.Function, finite: b
         zeta = _places(plies)
         expression = fem.Expression(wanted, _points(axis, bool(up), zeta.ravel()))
         values = np.asarray(expression.eval(domain, on.cells[mine].astype(np.int32)))
-        values = values.reshape(len(mine), len(plies.plies), 3, 4, 9).mean(axis=3)
-        tables.append(_of_layer(cells, layer, values, cells.heights[mine], zeta))
+        values = values.reshape(len(mine), len(plies.plies), 3, 4, 10).mean(axis=3)
+        tables.append(_of_layer(cells, layer, values, cells.heights[mine], zeta, finite))
         tables[-1]["cell"] = original[on.cells[mine]]
     rows = [_rows(t) for t in tables]
     ours = {key: np.concatenate([r[key] for r in rows]) for key in rows[0]}
@@ -191,40 +200,58 @@ def _points(axis: int, up: bool, zeta: Array) -> Array:
 
 
 def _of_layer(
-    cells: ShellCells, layer: int, values: Array, heights: Array, zeta: Array
+    cells: ShellCells, layer: int, values: Array, heights: Array, zeta: Array, finite: bool
 ) -> dict[str, Any]:
     """Strains, stresses and forces of cells of one layer.
 
     Args:
         cells: The continuum shell.
         layer: Which layer of cells.
-        values: Strains in laminate axes and positions, shape (n_cells, n_plies, 3, 9).
+        values: Strains in laminate axes, positions and rise of temperature, shape
+            (n_cells, n_plies, 3, 10).
         heights: Thickness of each cell, shape (n_cells,).
         zeta: From :func:`_places`.
+        finite: Whether the strain is finite, and with it the thermal one.
     """
     plies = cells.layers[layer].plies
     k13, k23 = cells.shear_factors
     root = np.sqrt(np.array([1.0, 1.0, 1.0, k23, k13, 1.0]))
-    strain, stress = np.empty_like(values[..., :6]), np.empty_like(values[..., :6])
+    whole = np.empty((*values.shape[:3], 6))  # strains less the thermal ones, laminate axes
+    sigma = np.empty_like(whole)
+    free = np.empty_like(whole)
+    moduli = [p.stiffness() * np.outer(root, root) for p in plies]
+    for i, (ply, c) in enumerate(zip(plies, moduli, strict=True)):
+        rise, expansion = values[:, i, :, 9:], ply.thermal_expansion()
+        free[:, i] = rise * expansion
+        if finite:
+            free[:, i] += 0.5 * rise**2 * square_strain(expansion)
+        whole[:, i] = values[:, i, :, :6] - free[:, i]
+        sigma[:, i] = whole[:, i] @ c
+    weight = _SIMPSON * (zeta[:, 2] - zeta[:, 0])[:, None]
     forces = np.zeros((len(values), 8))
-    for i, ply in enumerate(plies):
-        in_laminate = values[:, i, :, :6]
-        sigma = in_laminate @ (ply.stiffness() * np.outer(root, root))
-        strain[:, i] = ply.to_ply(in_laminate)
-        stress[:, i] = ply.stress_to_ply(sigma)
-        weight = _SIMPSON * (zeta[i, 2] - zeta[i, 0])
-        for first, powers in ((0, 0), (3, 1)):
-            moment = (weight * zeta[i] ** powers) @ sigma[..., [0, 1, 5]]
-            forces[:, first : first + 3] += moment * heights[:, None] ** (1 + powers)
-        forces[:, 6:] += weight @ sigma[..., [4, 3]] * heights[:, None]
+    for first, power in ((0, 0), (3, 1)):
+        moment = np.einsum("pj,npjc->nc", weight * zeta**power, sigma[..., [0, 1, 5]])
+        forces[:, first : first + 3] = moment * heights[:, None] ** (1 + power)
+    forces[:, 6:] = np.einsum("pj,npjc->nc", weight, sigma[..., [4, 3]]) * heights[:, None]
+    mean, slope = (
+        factor * np.einsum("pj,npj->n", weight * zeta**k, sigma[..., 2])
+        for k, factor in ((0, 1.0), (1, 12.0))
+    )
+    across = mean[:, None, None] + slope[:, None, None] * zeta
+    strain, stress = np.empty_like(whole), np.empty_like(whole)
+    others = [0, 1, 3, 4, 5]
+    for i, (ply, c) in enumerate(zip(plies, moduli, strict=True)):
+        whole[:, i, :, 2] = (across[:, i] - whole[:, i][..., others] @ c[others, 2]) / c[2, 2]
+        strain[:, i] = ply.to_ply(whole[:, i] + free[:, i])
+        stress[:, i] = ply.stress_to_ply(whole[:, i] @ c)
     return {
         "ply": cells.first_plies[layer] + np.arange(len(plies)),
         "angle": np.array([p.angle for p in plies]),
-        "x": values[..., 6:],
+        "x": values[..., 6:9],
         "strain": strain,
         "stress": stress,
         "forces": forces,
-        "centres": values[..., 6:].mean(axis=(1, 2)),
+        "centres": values[..., 6:9].mean(axis=(1, 2)),
     }
 
 
