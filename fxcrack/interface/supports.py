@@ -311,7 +311,7 @@ def check_slaves(
                 which[masters], value[masters], supports,
             )  # fmt: skip
             if column is None:
-                _check_points_held(pair, node, which[slave[node]], which[masters], supports)
+                _check_points_held(pair, int(node), which[slave[node]], which[masters], supports)
                 continue
             if pair.bonded[node]:
                 raise InterfaceError(
