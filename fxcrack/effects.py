@@ -20,6 +20,8 @@ from fxcrack.continuum.inertia import Inertia, InertiaForces
 from fxcrack.continuum.loads import Load, Pressure
 from fxcrack.continuum.neo_hookean import NeoHookeanBodies
 from fxcrack.continuum.plasticity import Plasticity
+from fxcrack.continuum.shell_bodies import ShellBodies
+from fxcrack.continuum.shell_elastic import ShellElastic
 from fxcrack.continuum.temperature import Temperature, expansion_of
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
@@ -74,6 +76,16 @@ def _follows(load: Load) -> bool:
     return isinstance(load, Pressure) and load.follows
 
 
+def _check_shells(effects: Sequence[Any], loads: Sequence[Load]) -> None:
+    """Refuse what shells cannot have."""
+    if any(isinstance(e, Inertia) for e in effects):
+        raise InputError("Inertia is not possible in shells; use ContinuumShell or solids")
+    for load in filter(_follows, loads):
+        raise InputError(
+            f"pressure '{load.title}': a pressure on a shell keeps its direction; leave out follows"
+        )
+
+
 def plan(
     continuum: Continuum,
     effects: Sequence[Any],
@@ -96,6 +108,8 @@ def plan(
     why, on = [], []
     forms = _forms(continuum)
     finite = _is_finite(forms, effects)
+    if isinstance(continuum, ShellBodies):
+        _check_shells(effects, loads)
     if finite and "plastic" in forms:
         raise InputError(
             "Plastic is a law for small strain and cannot stand beside finite strain; leave out "
@@ -147,6 +161,8 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     """Terms of the bodies for the Newton solver, one per effect."""
     forms = _forms(continuum)
     terms: list[Term] = []
+    if isinstance(continuum, ShellBodies):
+        terms.append(ShellElastic(continuum, finite=_is_finite(forms, effects)))
     if "elastic" in forms:
         terms.append(Elastic(continuum, finite=_is_finite(forms, effects)))
     if "neo_hookean" in forms:

@@ -161,7 +161,7 @@ class ShellBodies(Continuum):
         element, nodes, x = self.element, self._nodes[cells], self._x[cells]
         sign = self.signs[cells]
         directors = self.directors[nodes]
-        vectors = np.stack([x, directors], axis=2).reshape(len(x), -1, 3)
+        vectors = np.stack([x, directors], axis=2).reshape(len(x), 2 * nodes.shape[1], 3)
         tangents = np.einsum("dpk,ckx->dcpx", element.gradients, x)
         area_vector = np.cross(tangents[0], tangents[1])
         jacobian = np.linalg.norm(area_vector, axis=-1)

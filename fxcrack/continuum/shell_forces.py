@@ -125,7 +125,7 @@ def _spread(shell: ShellBodies, part: ShellPart, rows: Ints, on_u: Array, on_w: 
     """Nodes and vectors of cells under forces per area on u and w, (n_cells, n_points, 3)."""
     force = np.concatenate([on_u, on_w], axis=-1) * part.area[rows][..., None]
     values = np.einsum("pk,cpj->ckj", shell.element.values, force)
-    return part.nodes[rows], values.reshape(len(rows), -1)
+    return part.nodes[rows], values.reshape(len(rows), 6 * values.shape[1])
 
 
 def _face_load(shell: ShellBodies, load: Traction | Pressure, face: Face) -> PETSc.Vec:

@@ -45,7 +45,7 @@ def shell_stress(shell: ShellBodies, q: Array, *, finite: bool = False) -> list[
     vectors = q.reshape(-1, 2, 3)
     out = []
     for part in shell.shell_parts:
-        change = vectors[part.nodes].reshape(len(part.nodes), -1, 3)
+        change = vectors[part.nodes].reshape(len(part.nodes), 2 * part.nodes.shape[1], 3)
         e = part.strain_cells.strains(change, finite=finite)
         share = part.area / part.area.sum(axis=1, keepdims=True)
         axes = part.axes

@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from typing import Any
 
+from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import ufl
 from dolfinx import fem
+from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.continuum import Continuum
@@ -33,6 +35,8 @@ class Term:
         closed: Whether it stores all the work done on it, that of loads and its own
             (:meth:`path_work`).
         energy_name: Name of its stored energy in the energy balance; terms of one name are summed.
+        by_cells: Whether it is no form and adds its vectors and matrices of cells itself, by
+            :meth:`add_residual`, :meth:`add_tangent` and :meth:`stored`.
     """
 
     name: str = ""
@@ -44,6 +48,17 @@ class Term:
     dynamic: bool = False
     path_dependent: bool = False
     closed: bool = True
+    by_cells: bool = False
+
+    def add_residual(self, vector: PETSc.Vec, u: fem.Function) -> None:
+        """Add internal minus external forces to a ghosted vector, ghosts too, by cells."""
+
+    def add_tangent(self, matrix: PETSc.Mat, u: fem.Function) -> None:
+        """Add their change with u, by cells; the caller assembles."""
+
+    def stored(self, u: fem.Function) -> float:
+        """Energy stored in the cells that this rank owns, by cells, force x length."""
+        return 0.0
 
     def energy(self, u: fem.Function) -> Any:
         """Stored energy as a UFL form, ``None`` if it stores none."""

@@ -61,7 +61,7 @@ class WeakForm:
     @property
     def n_forms(self) -> int:
         """Number of compiled forms."""
-        return 2 * len(self._forms) + len(self._energies)
+        return 2 * sum(f is not None for _, f, _ in self._forms) + len(self._energies)
 
     @property
     def symmetric(self) -> bool:
@@ -110,11 +110,14 @@ class WeakForm:
         space = self.continuum.space
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
         for term in self.terms:
+            if term.by_cells:
+                self._forms.append((term, None, None))
+                continue
             residual = fem.form(term.residual(self.u, v))
             self._forms.append((term, residual, fem.form(term.tangent(self.u, v, du))))
         energies: dict[str, Any] = {}
         for term in self.terms:
-            energy = term.energy(self.u)
+            energy = None if term.by_cells else term.energy(self.u)
             if energy is not None:
                 energies[term.energy_name] = energies.get(term.energy_name, 0) + energy
         self._energies = {name: fem.form(energy) for name, energy in energies.items()}
@@ -135,17 +138,20 @@ class WeakForm:
     def residual(self) -> PETSc.Vec:
         """R(u) on owned dofs; the caller destroys it."""
         self.compile()
-        vector = compat.create_vector(self._forms[0][1])
+        vector = compat.create_vector(self.continuum.space)
         for term, form, _ in self._forms:
             start = time.perf_counter()
-            dolfinx.fem.petsc.assemble_vector(vector, form)
+            if form is None:
+                term.add_residual(vector, self.u)
+            else:
+                dolfinx.fem.petsc.assemble_vector(vector, form)
             self._add(term.name, start)
         vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
         return vector
 
     def _pattern(self) -> Any:
         """A form that couples what any term couples: the displacements of each cell."""
-        if len(self._forms) == 1:
+        if len(self._forms) == 1 and self._forms[0][2] is not None:
             return self._forms[0][2]
         space = self.continuum.space
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
@@ -160,7 +166,10 @@ class WeakForm:
             self._matrix.zeroEntries()
             for term, _, form in self._forms:
                 start = time.perf_counter()
-                dolfinx.fem.petsc.assemble_matrix(self._matrix, form)
+                if form is None:
+                    term.add_tangent(self._matrix, self.u)
+                else:
+                    dolfinx.fem.petsc.assemble_matrix(self._matrix, form)
                 self._add(term.name, start)
             self._matrix.assemble()
             self._assembled = self.version
@@ -186,11 +195,12 @@ class WeakForm:
     def stored(self) -> dict[str, float]:
         """Energies stored at the present displacement by name, force x length; collective."""
         self.compile()
+        mine = {name: fem.assemble_scalar(form) for name, form in self._energies.items()}
+        for term in self.terms:
+            if term.by_cells:
+                mine[term.energy_name] = mine.get(term.energy_name, 0.0) + term.stored(self.u)
         comm = self.continuum.comm
-        return {
-            name: float(comm.allreduce(fem.assemble_scalar(form), op=MPI.SUM))
-            for name, form in self._energies.items()
-        }
+        return {name: float(comm.allreduce(x, op=MPI.SUM)) for name, x in mine.items()}
 
     def stress(self) -> fem.Function:
         """Cauchy stress at the present displacement, means over the undeformed cells; collective.
