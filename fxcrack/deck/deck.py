@@ -68,7 +68,7 @@ class Deck:
 def read_deck(
     path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD, *, order: int | None = None
 ) -> Deck:
-    """Read a keyword deck (*.inp); collective.
+    """Read a keyword deck, ``*.inp``; collective.
 
     What has no word in fxcrack is refused with file, line, card and what would help; what is
     computed in another way than the deck says is warned of once and listed in ``deck.report``.
