@@ -44,10 +44,18 @@ def check_energy(history: History, first: int) -> None:
         first: Number of the first row of the step.
 
     Raises:
-        EnergyError: More than :data:`REFUSED` of the largest energy is missing.
+        EnergyError: More than :data:`REFUSED` of the largest energy is missing, or an energy is no
+            finite number.
     """
     comm = history.comm
     part, made, time = comm.bcast(_errors(history.rows, first) if comm.rank == 0 else None)
+    if part == np.inf:
+        raise EnergyError(
+            f"an energy of the step is no finite number at time {time:g}: loads or displacements are "
+            "too large for floating-point numbers; check their units and amplitudes. The rows are "
+            "kept: scene.history",
+            part,
+        )
     if part > REFUSED:
         raise EnergyError(
             f"the energy balance of the step is off by {part:.2g} of the largest energy at time "
