@@ -10,7 +10,14 @@ import pytest
 from mpi4py import MPI
 from specimens import largest_imbalance
 
-from fxcrack.demos import dynamic_dcb, large_dcb, plastic_cod, thermal_bilayer
+from fxcrack.demos import (
+    dynamic_dcb,
+    explicit_dcb,
+    large_dcb,
+    plastic_cod,
+    running_crack,
+    thermal_bilayer,
+)
 
 pytestmark = pytest.mark.demos
 
@@ -96,3 +103,22 @@ def test_slow_impact_is_quasi_static_and_fast_one_is_not(comm: MPI.Intracomm):
         assert largest_imbalance(history) < BALANCE
         kinetic = history["kinetic_energy"].astype(float).max() / history["external_work"][-1]
         assert kinetic < 1e-2 if speed == 1e2 else kinetic > 0.3
+
+
+@pytest.mark.mpi
+def test_explicit_and_implicit_dynamics_open_the_same_crack(comm: MPI.Intracomm):
+    speed, lengths = 8e3, np.array([32.0, 34.0])
+    explicit, _ = explicit_dcb.run(1.0, speed, explicit=True, until=34.0, comm=comm)
+    implicit, _ = explicit_dcb.run(1.0, speed, explicit=False, until=34.0, comm=comm)
+    one, other = (explicit_dcb.openings(h, speed, lengths) for h in (explicit, implicit))
+    # elements twice as long as those of the table in the demo, which has 1 to 5 %
+    assert one == pytest.approx(other, rel=0.06)
+    assert largest_imbalance(explicit) < 1e-9
+
+
+@pytest.mark.mpi
+def test_a_crack_runs_above_its_toughness_only(comm: MPI.Intracomm):
+    rest, runs = running_crack.run(0.98, 5, comm=comm), running_crack.run(1.5, 5, comm=comm)
+    assert running_crack.speed(rest) == 0.0
+    assert 0.6 < running_crack.speed(runs) < 1.0
+    assert runs["spent[bond]"][-1] == pytest.approx(running_crack.G_C, rel=1e-10)

@@ -38,7 +38,8 @@ def test_energies_balance_with_every_release_law(options: dict[str, Any]) -> Non
     assert history["a[bond]"][-1] >= 36.0
     assert imbalance(history) <= 1e-10
     if isinstance(options["release"], fx.ProgressiveRelease):
-        assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=1e-10)
+        # a bond that is pressed shut while it softens is solved in sweeps together with contact
+        assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=2e-6)
 
 
 def test_condensed_steps_have_one_element_of_softening() -> None:
@@ -142,7 +143,8 @@ def test_finite_strain_balances(kind: str) -> None:
     assert history["a[bond]"][-1] >= 36.0
     # of the second order in the increment
     assert imbalance(history) <= 1e-4
-    assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=1e-10)
+    # the area that softens is taken on the deformed face, which is stretched by 1e-3 here
+    assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=3e-3)
 
 
 def test_axisymmetric_scene_balances() -> None:

@@ -634,7 +634,9 @@ class ExplicitSolver:
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Present displacement; collective; the caller destroys it."""
-        vector = PETSc.Vec().createMPI((self.continuum.n_local, self.continuum.n_global), self.comm)
+        vector = PETSc.Vec().createMPI(
+            (self.continuum.n_local, self.continuum.n_global), comm=self.comm
+        )
         vector.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
         return vector
 

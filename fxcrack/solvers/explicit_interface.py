@@ -309,7 +309,7 @@ class InterfaceDynamics:
         pressure = np.zeros(len(free))
         touch = self._may_touch[:0]
         forces: Array | None = None
-        for sweep in range(1 if lumped.simple else SWEEPS):
+        for sweep in range(SWEEPS):
             there = free
             if sweep and forces is not None:
                 there = free + hh * lumped.response(forces)
@@ -328,6 +328,8 @@ class InterfaceDynamics:
                 return None
             forces = pressure[:, None] * self._normal
             forces[soft] -= strength[:, None] * self._e
+            if lumped.simple and not (len(soft) and pressure[soft].any()):
+                break  # every pair moves by itself, and softens or touches
             if sweep and _settled(strength, before) and _settled(pressure, pressed):
                 break
         assert forces is not None
@@ -462,9 +464,10 @@ class InterfaceDynamics:
         k, bonds = self._soft_rows, self.bonds
         spent = -(forces * way[soft]).sum(axis=1)
         self.energies.bonds += float(spent.sum())
-        bonds.spent[k] += spent
         middle = self.gap[soft] + 0.5 * dt * self.lumped.jumps(self.v)[soft]
         low = (middle * self._e).sum(axis=1)
+        # by openings in the middle of increments, of which the first one counts whole
+        bonds.spent[k] += -(forces * self._e).sum(axis=1) * (low - bonds.low[k])
         bonds.low[k] = low
         bonds.top[k] = top = np.maximum(bonds.top[k], low)
         done = top >= _FREE * self._final
