@@ -5,7 +5,7 @@
 In the unknowns of the jump coordinates this is delta_n + g >= 0 with g = n . (X_s - sum W_m X_m).
 n is the master's normal, interpolated from those of its nodes: over a facet it is on the mean that
 of the facet, so that contact forces do no work on what slides over it. Bonded nodes keep the master
-point they are bonded to.
+point they are bonded to, as long as their bonds carry any force.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ def renewed(
 
     Args:
         pair: The pair as it is.
-        bonded: Slave nodes that are bonded now, shape (n_nodes,).
+        bonded: Slave nodes that are bonded now, or whose bonds still pull, shape (n_nodes,).
         master: Undeformed master surface.
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
         u_master: Displacements of the master nodes, shape (master.n_nodes, gdim), length.

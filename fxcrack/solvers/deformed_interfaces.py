@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Bools
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.finite_sliding import CHANGING, changing, renewed, with_changing
 from fxcrack.interface.front import Front
@@ -72,10 +72,15 @@ class DeformedInterfaces:
             moved[:, : self._gdim] += self._reader.displacements(values, pair.surface)
             front.follow(moved)
 
-    def pair_anew(self, u: PETSc.Vec) -> bool:
+    def pair_anew(self, u: PETSc.Vec, pulling: list[Bools]) -> bool:
         """Pair open nodes with the master surface where it is now; whether any changed.
 
         Collective.
+
+        Args:
+            u: Displacement, owned dofs.
+            pulling: Per pair, nodes whose bonds are released but still carry a force: it acts on
+                the master point they were bonded to, shape (n_nodes,).
         """
         if not self.follow_sliding:
             return False
@@ -87,7 +92,7 @@ class DeformedInterfaces:
             pair = self._pairs[p]
             new = renewed(
                 pair,
-                self._fronts[p].bonded,
+                self._fronts[p].bonded | pulling[p],
                 master,
                 self._reader.displacements(values, pair.surface),
                 self._reader.displacements(values, master),

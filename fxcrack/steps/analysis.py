@@ -292,11 +292,27 @@ class Analysis:
                 linear piece (or the last move of the Newton solver) in between.
             time: Its time.
         """
-        here, balance = self.solver.state, self.balance
-        work, released, mean = self.condensed.along(here, point)
+        here = self.solver.state
+        self.book(here, point, *self.condensed.along(here, point))
+        self.condensed.book_contact(here, point)
+        self.solver.state = point
+        self.balance.time = time
+
+    def book(
+        self, here: Equilibrium, point: Equilibrium, work: float, released: float, mean: Array
+    ) -> None:
+        """Account for the work of a piece and for what bonds released on it.
+
+        Args:
+            here: Its beginning.
+            point: Its end.
+            work: External work.
+            released: Energy that bonds released.
+            mean: Mean jumps, shape (n_retained,), length.
+        """
+        balance = self.balance
         balance.external_work += work
         balance.released += released
-        self.condensed.book_contact(here, point)
         for ramp in self.ramps:
             index = self.condensed.components(ramp.p, ramp.nodes)
             force, last = here.force[index], point.force[index]
@@ -304,8 +320,6 @@ class Analysis:
             spent += float((last - force) @ mean[index])
             balance.by_force += spent
             balance.viscous += ramp.viscous_part(spent, self.condensed, here.jump, point.jump)
-        self.solver.state = point
-        balance.time = time
 
     def snapshot(self) -> Snapshot:
         """What :meth:`rollback` needs to return to the present equilibrium."""

@@ -51,9 +51,9 @@ def check_energy(history: History, first: int) -> None:
     part, made, time = comm.bcast(_errors(history.rows, first) if comm.rank == 0 else None)
     if part == np.inf:
         raise EnergyError(
-            f"an energy of the step is no finite number at time {time:g}: loads or displacements are "
-            "too large for floating-point numbers; check their units and amplitudes. The rows are "
-            "kept: scene.history",
+            f"an energy of the step is no finite number at time {time:g}: loads or displacements "
+            "are too large for floating-point numbers; check their units and amplitudes. The rows "
+            "are kept: scene.history",
             part,
         )
     if part > REFUSED:

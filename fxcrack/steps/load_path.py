@@ -18,7 +18,13 @@ from fxcrack.steps.rows import Recorder
 
 
 class LoadPath(Protocol):
-    """Moves an analysis along the load of its step, at constant bonds; collective."""
+    """Moves an analysis along the load of its step, at constant bonds; collective.
+
+    Attributes:
+        resolution: How near to 1 the largest f is at a crossing at least.
+    """
+
+    resolution: float
 
     def to_crossing(self, target: float, *, upward: bool) -> bool:
         """Advance towards a time; stop where the largest f crosses 1.
@@ -88,6 +94,8 @@ class LinearLoadPath:
         record: Adds a row to the history; event "snap" where cohesive bonds ran through unstable
             states.
     """
+
+    resolution = 1e-9
 
     def __init__(self, analysis: Analysis, record: Recorder) -> None:
         self._analysis = analysis

@@ -53,6 +53,8 @@ class NewtonLoadPath:
         InputError: The step looks for equilibria, but the bodies move in time.
     """
 
+    resolution = _NEAR_ONE
+
     def __init__(
         self, analysis: Analysis, solver: NewtonSolver, step: Static, record: Recorder
     ) -> None:
@@ -109,6 +111,8 @@ class NewtonLoadPath:
             except EnergyImbalance as error:
                 size, accepted = 0.5 * abs(guess - begin), 0
                 strict = size > FINE * whole
+                if size < _SMALLEST * whole:
+                    raise TooManyCutbacks(str(error)) from error
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
             except ConvergenceError as error:
@@ -128,6 +132,8 @@ class NewtonLoadPath:
                 if jumps and off > _AT_ONE:
                     self._report_jump(before, level, bracket)
                 return True
+            if -off < _NEAR_ONE and -off > 0.5 * abs(before - 1.0):
+                return True  # nearer than the iteration can resolve
             if guess == target:
                 return False
             idle = idle + 1 if abs(guess - begin) <= _NO_PROGRESS * abs(begin) else 0
@@ -155,8 +161,8 @@ class NewtonLoadPath:
         """Whether the way back passes through the same equilibria: nothing depends on the path."""
         solver = self._solver
         dependent = solver.bodies.path_dependent or solver.system.soft.bonds or self._analysis.ramps
-        slides = solver.system.friction is not None or solver.interfaces.follow_sliding
-        return not (dependent or slides)
+        # faces are paired anew before an increment only, never on the way back
+        return not (dependent or solver.system.friction is not None)
 
     def _try(self, at: float, *, strict: bool = False) -> tuple[Equilibrium, list[TipValues]]:
         """The equilibrium at a time, a trial, and the criteria there."""
@@ -292,8 +298,10 @@ class NewtonLoadPath:
         """Renew the pairing of faces that have slid, where the bodies move far; whether it has."""
         changed = self._solver.renew_pairs()
         if changed:
-            force = self._analysis.given_force(self._analysis.time)
-            self._analysis.balance.external_work += self._solver.settle(force)
+            here = self._solver.state
+            work = self._solver.settle(self._analysis.given_force(self._analysis.time))
+            if work is not None:
+                self._analysis.book(here, self._solver.state, *work)
             self._analysis.evaluate_tips()
         return changed
 
@@ -312,11 +320,16 @@ class NewtonLoadPath:
 
         Args:
             target: Time of the trial.
-            least: Increments of time that are accepted whatever their energies are.
+            least: Increments of time that are not divided; their energies are known less well.
+
+        Raises:
+            EnergyImbalance: An increment of that length ends in no equilibrium of its work.
         """
         try:
             return self._move(target, strict=abs(target - self._analysis.time) > least)
         except EnergyImbalance as error:
+            if abs(target - self._analysis.time) <= least:
+                raise
             log.info("half of an increment first: %s", error)
         middle = 0.5 * (self._analysis.time + target)
         point = self._approach(middle, least)

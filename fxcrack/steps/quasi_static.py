@@ -26,8 +26,8 @@ _NEVER = (
     "the criterion is not reached however large the load becomes; the step ends where that search "
     "began"
 )
-_BELOW, _ABOVE = 1.0 - 1e-9, 1.0 + 1e-9
-"""Values of f between these count as 1."""
+_ABOVE = 1.0 + 1e-9
+"""Values of f above this are more than 1."""
 _AT_ONE = 1e-6
 """How far from 1 a search for f = 1 may end, that of nonlinear bodies included."""
 
@@ -92,7 +92,7 @@ def step_by_events(driver: StepDriver) -> str:
         reason = driver.ended()
         if reason:
             return reason
-        if analysis.largest >= _BELOW:
+        if _reached(driver):
             driver.record("onset")
             release_critical(analysis)
             driver.record("release")
@@ -101,7 +101,7 @@ def step_by_events(driver: StepDriver) -> str:
             return "the curves of crack length against time have ended"
         if not _load_to_event(driver):
             return driver.ended() or _never(driver)
-        if analysis.largest < _BELOW and not driver.ended():
+        if not _reached(driver) and not driver.ended():
             driver.record("bend")
 
 
@@ -119,9 +119,10 @@ def step_along_path(driver: StepDriver) -> str:
                 raise InputError(
                     "stepping='path': f stays above 1 down to zero load; check prestress"
                 )
-        elif analysis.largest < _BELOW and not _load_to_event(driver):
+        elif not _reached(driver) and not _load_to_event(driver):
             return driver.ended() or _never(driver)
-        if abs(analysis.largest - 1.0) > _AT_ONE:
+        most = 1.0 + max(_AT_ONE, driver.path.resolution)
+        if not _reached(driver) or analysis.largest > most:
             continue  # f jumped over 1 where bonds ran through unstable states, or the end came
         driver.record("onset")
         release_critical(analysis)
@@ -138,9 +139,9 @@ def step_by_opening(driver: StepDriver) -> str:
         reason = driver.ended()
         if reason:
             return reason
-        if analysis.largest < _BELOW and not _load_to_event(driver):
+        if not _reached(driver) and not _load_to_event(driver):
             return driver.ended() or _never(driver)
-        if analysis.largest < _BELOW:
+        if not _reached(driver):
             continue  # the end time came first
         control.reach(analysis.solver.state)
         driver.record("onset")
@@ -162,6 +163,11 @@ _STEPPINGS: dict[str, Callable[[StepDriver], str]] = {
     "opening": step_by_opening,
     "increment": step_by_increments,
 }
+
+
+def _reached(driver: StepDriver) -> bool:
+    """Whether the largest f counts as 1 or more."""
+    return driver.analysis.largest >= 1.0 - driver.path.resolution
 
 
 # -- loading ---------------------------------------------------------------------------------------
