@@ -207,12 +207,10 @@ def _scale(
     if comm.size > 1:
         raise InputError("'fxcrack bench scale' starts its ranks itself: run it without mpirun")
     try:
-        cases = scale.suite(
-            [float(s) for s in sizes.split(",")], shapes.split(","), methods.split(","),
-            [int(r) for r in ranks.split(",")],
-        )  # fmt: skip
+        given = [float(s) for s in sizes.split(",")], [int(r) for r in ranks.split(",")]
     except ValueError as error:
         raise InputError(f"sizes '{sizes}', ranks '{ranks}': give numbers with commas") from error
+    cases = scale.suite(given[0], shapes.split(","), methods.split(","), given[1])
     positive("scale", limit=limit)
     if memory is not None:
         positive("scale", memory=memory)
