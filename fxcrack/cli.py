@@ -28,8 +28,9 @@ from rich.table import Table
 from typer.main import get_command
 
 from fxcrack.base import log
-from fxcrack.base.errors import FxcrackError, InputError
-from fxcrack.base.files import write_json
+from fxcrack.base.checks import positive
+from fxcrack.base.errors import FxcrackError, InputError, raise_on_all_ranks
+from fxcrack.base.files import check_writable, write_json
 from fxcrack.base.machine import cores, machine_memory_mb
 from fxcrack.base.parallel import all_arrive, end_all
 from fxcrack.base.signals import Interrupted
@@ -46,6 +47,41 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
+
+
+def _check_outputs(outputs: Sequence[tuple[str, Path | None, bool]]) -> None:
+    """Refuse outputs that could not be written, before anything is computed; collective.
+
+    Args:
+        outputs: Option, path if it was given, and whether that is a folder.
+    """
+    problem = None
+    if MPI.COMM_WORLD.rank == 0:
+        try:
+            for option, path, folder in outputs:
+                if path is not None:
+                    check_writable(option, path, folder=folder)
+        except InputError as error:
+            problem = str(error)
+    raise_on_all_ranks(MPI.COMM_WORLD, problem)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        rank_0_console().print(f"fxcrack {fxcrack.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool,
+        typer.Option(
+            "--version", help="Show the version and exit.", callback=_show_version, is_eager=True
+        ),
+    ] = False,
+) -> None:
+    """Crack propagation along predefined, initially bonded interfaces, on FEniCSx."""
 
 
 # -- demos ---------------------------------------------------------------------------
@@ -93,8 +129,9 @@ def demo(
         raise InputError(f"there is no demo '{name}'; known: {', '.join(titles) or 'none'}")
     from fxcrack.restart.checkpoint import checkpoints
 
-    module = importlib.import_module(f"fxcrack.demos.{name}")
     folder = Path("out") / name if out is None else out
+    _check_outputs([("--out", folder, True)])
+    module = importlib.import_module(f"fxcrack.demos.{name}")
     with contextlib.ExitStack() as stack:
         if checkpoint or restart:
             stack.enter_context(checkpoints(folder / "checkpoints", restart=restart, seconds=10.0))
@@ -166,6 +203,7 @@ def bench(
 
     "scale" compares the direct and the iterative method, 1 rank and several, over sizes.
     """
+    _check_outputs([("--json", json_file, False), ("--store", store, False)])
     if name == "scale":
         _scale(sizes, shapes, methods, ranks, limit, memory, json_file, store)
         return
@@ -198,12 +236,13 @@ def _scale(
     if comm.size > 1:
         raise InputError("'fxcrack bench scale' starts its ranks itself: run it without mpirun")
     try:
-        cases = scale.suite(
-            [float(s) for s in sizes.split(",")], shapes.split(","), methods.split(","),
-            [int(r) for r in ranks.split(",")],
-        )  # fmt: skip
+        given = [float(s) for s in sizes.split(",")], [int(r) for r in ranks.split(",")]
     except ValueError as error:
         raise InputError(f"sizes '{sizes}', ranks '{ranks}': give numbers with commas") from error
+    cases = scale.suite(given[0], shapes.split(","), methods.split(","), given[1])
+    positive("scale", limit=limit)
+    if memory is not None:
+        positive("scale", memory=memory)
     most = 0.8 * machine_memory_mb(comm) if memory is None else 1e3 * memory
     console = Console(stderr=True, highlight=False)
 
@@ -213,6 +252,9 @@ def _scale(
 
     result = scale.run(cases, memory_mb=most, limit=limit, tell=tell)
     show_scale(result, rank_0_console())
+    reasons = [str(case["failed"]) for case in result["cases"] if case.get("failed")]
+    if len(reasons) == len(result["cases"]):
+        raise FxcrackError(f"no case gave a result: {reasons[0] if reasons else 'there is none'}")
     wanted = [(json_file, result), (store, fit_constants(result) if store else None)]
     for path, content in wanted:
         if path is not None:
@@ -239,6 +281,8 @@ def cost(
     from fxcrack.bench.tables import show_cost
     from fxcrack.condensation.cost_laws import Constants, shipped
 
+    if memory is not None:
+        positive("cost", memory=memory)
     measured = shipped() if constants is None else Constants.read(constants)
     each = 1e9 * memory if memory else 1e6 * machine_memory_mb(MPI.COMM_WORLD) / cores()
     try:
@@ -289,10 +333,11 @@ def accuracy(
     except ValueError:
         raise InputError(f"--sizes {sizes}: give numbers with commas, e.g. 1,0.5,0.25") from None
     console = rank_0_console()
+    folder = Path("out") / "accuracy" / scene.rpartition(":")[2] if out is None else out
+    _check_outputs([("--out", folder, True)])
     result = run_study(scene, budget=budget, sizes=chosen, measure=measure, tell=console.print)
     report.show(result, console)
-    name = scene.rpartition(":")[2]
-    files = report.write(result, Path("out") / "accuracy" / name if out is None else out)
+    files = report.write(result, folder)
     console.print(f"files: {', '.join(str(f) for f in files)}")
 
 

@@ -24,6 +24,7 @@ from fxcrack.base.checks import (
     warn_of_same_titles,
 )
 from fxcrack.base.errors import InputError
+from fxcrack.base.together import inside, meet
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
@@ -237,7 +238,11 @@ class Scene:
             solver=solver if path is None else _solver_of_path(path, solver),
             newton=newton,
         )
+        given = {f.name: getattr(self.input, f.name) for f in fields(self.input)}
+        meet(mesh.comm, "Scene(...)", given | {"mesh": f"'{mesh.name}' of {mesh.gdim} dimensions"})
         self.analysis = _analysis(self.input)
+        found = [(pair.bonded, pair.friction) for pair in self.pairs]
+        meet(mesh.comm, "Scene(...)", {"bonded nodes and friction of the interfaces": found})
         self._files = RunFiles()
 
     def rebuilt(self, **changes: Any) -> Scene:
@@ -361,6 +366,27 @@ class Scene:
         check_instance("run", "step", step, (Static, Cycles, Explicit), "Static(until=Time(1.0))")
         chosen = self.debonds if grow is None else check_list("run", "grow", grow, Debond)
         self._check_step(step, chosen)
+        given = {
+            **{"step": step, "grow": [d.interface.title for d in chosen], "accuracy": accuracy},
+            **{"save": save, "checkpoint": checkpoint, "restart": restart},
+            "observers": len(observers),
+        }
+        meet(self.mesh.comm, "Scene.run", given)
+        with inside():
+            return self._run(step, chosen, accuracy, save, checkpoint, progress, restart, observers)
+
+    def _run(
+        self,
+        step: Static | Cycles | Explicit,
+        chosen: Sequence[Debond],
+        accuracy: float | None,
+        save: str | Path | None,
+        checkpoint: Checkpoint | None,
+        progress: bool,
+        restart: bool,
+        observers: Sequence[Observer],
+    ) -> History:
+        """Run a step whose arguments were checked; collective."""
         if isinstance(step, Explicit):
             self._use_explicit(step, chosen, accuracy)
         analysis = self.analysis
@@ -370,6 +396,8 @@ class Scene:
         for g in analysis.active:
             if not len(g.tips()):
                 log.warn("%s, so nothing can debond", why_no_tip(g.front))
+        tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
+        meet(self.mesh.comm, "Scene.run", {"toughness at the slave nodes": tough})
         restarts = self._files.manager(analysis, step, may_grow, checkpoint, restart, save)
         self._prepare(restarts, may_grow, step)
         first = len(self.history)

@@ -71,6 +71,12 @@ def test_an_error_of_fxcrack_is_one_short_message(capfd: pytest.CaptureFixture[s
         (("bench", "dcb2d", "--dx", "-1"), 1, "dx = -1.0"),
         (("bench", "dcb2d", "--ny", "0"), 1, "ny = 0"),
         (("bench", "dcb3d", "--dy", "21"), 1, "dy = 21.0"),
+        (("bench", "scale", "--ranks", "0"), 1, "ranks = 0: choose at least 1"),
+        (("bench", "scale", "--shapes", "cube"), 1, "shape = 'cube': choose one of"),
+        (("bench", "scale", "--sizes", "few"), 1, "give numbers with commas"),
+        (("bench", "dcb2d", "--json", "/dev/null/x/a.json"), 1, "--json"),
+        (("cost", "--ranks", "0"), 1, "ranks = 0: choose at least 1"),
+        (("accuracy", "dcb", "--out", "/dev/null/x"), 1, "cannot be written"),
         (("bench",), 2, "NAME"),
         (("bench", "dcb2d", "--dx", "half"), 2, "--dx"),
         (("nonsense",), 2, "nonsense"),
@@ -83,6 +89,13 @@ def test_wrong_words_say_what_is_wrong(
     err = capfd.readouterr().err
     assert message in err
     assert "Traceback" not in err
+
+
+@pytest.mark.mpi
+def test_the_version_is_one_word(capfd: pytest.CaptureFixture[str]) -> None:
+    assert run("--version") == 0
+    wanted = f"fxcrack {fxcrack.__version__}\n" if MPI.COMM_WORLD.rank == 0 else ""
+    assert capfd.readouterr().out == wanted
 
 
 def test_demos_are_listed_without_a_name(capfd: pytest.CaptureFixture[str]) -> None:

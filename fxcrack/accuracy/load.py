@@ -49,8 +49,9 @@ def _module(where: str) -> ModuleType:
         assert spec is not None and spec.loader is not None
         module = importlib.util.module_from_spec(spec)
         if str(path.parent) not in sys.path:
-            sys.path.insert(0, str(path.parent))
-        sys.modules[path.stem] = module
+            # at the end: a file there that is called as a module of Python must not take its place
+            sys.path.append(str(path.parent))
+        sys.modules.setdefault(path.stem, module)
         spec.loader.exec_module(module)
     except FxcrackError:
         raise

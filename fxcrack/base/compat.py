@@ -11,6 +11,7 @@ import importlib.util
 import inspect
 from typing import Any
 
+from fxcrack.base import requirements  # isort: skip  # noqa: F401  (says what is missing)
 import numpy as np
 import numpy.typing as npt
 

@@ -10,6 +10,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
+from fxcrack.base.errors import InputError
+
 _NO_LINK = getattr(os, "O_NOFOLLOW", 0)
 
 
@@ -32,6 +34,31 @@ def replacing(path: str | Path) -> Iterator[Path]:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def check_writable(what: str, path: str | Path, *, folder: bool = False) -> None:
+    """Find out before a long run whether its results could be written; on one rank.
+
+    Args:
+        what: What the path was given as, for the message.
+        path: The file, or the folder, to be written; folders above it are made.
+        folder: Whether it is a folder.
+
+    Raises:
+        InputError: It could not; the message says why.
+    """
+    path = Path(path)
+    try:
+        if not folder and path.is_dir():
+            raise IsADirectoryError("it is a folder, not a file")
+        probe = path / "probe" if folder else path
+        probe.parent.mkdir(parents=True, exist_ok=True)
+        temporary = probe.parent / f".{secrets.token_hex(8)}"
+        os.close(os.open(temporary, os.O_WRONLY | os.O_CREAT | os.O_EXCL | _NO_LINK, 0o600))
+        temporary.unlink()
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise InputError(f"{what} '{path}' cannot be written: {reason}; give another") from error
 
 
 def write_json(path: str | Path, content: object) -> None:

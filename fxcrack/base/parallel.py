@@ -15,6 +15,7 @@ from types import TracebackType
 
 from mpi4py import MPI
 
+from fxcrack.base import together
 from fxcrack.base.errors import FxcrackError, raise_on_all_ranks
 from fxcrack.base.signals import Interrupted
 
@@ -75,10 +76,13 @@ def _abort(kind: type[BaseException], error: BaseException, trace: TracebackType
 def install() -> None:
     """End all ranks on an uncaught exception; on one rank only interruptions look different."""
     sys.excepthook = _abort
+    together.install()
 
 
 @contextmanager
-def all_or_none(comm: MPI.Comm, task: str) -> Iterator[None]:
+def all_or_none(
+    comm: MPI.Comm, task: str, kind: type[FxcrackError] = FxcrackError
+) -> Iterator[None]:
     """Let all ranks fail if one of them fails inside; collective.
 
     The block itself must not communicate; what ranks do in it may differ.
@@ -86,17 +90,20 @@ def all_or_none(comm: MPI.Comm, task: str) -> Iterator[None]:
     Args:
         comm: Communicator on which all ranks enter.
         task: What is being done, the beginning of the message.
+        kind: Class of the exception.
 
     Raises:
         FxcrackError: The block raised on some rank; its own exception is the cause there.
     """
+    together.meet(comm, task)
     cause: Exception | None = None
     try:
         yield
     except Exception as error:  # any exception must reach the other ranks
         cause = error
-    problem = None if cause is None else f"{task}: {type(cause).__name__}: {cause}"
+    name = "" if isinstance(cause, FxcrackError) else f"{type(cause).__name__}: "
+    problem = None if cause is None else f"{task}: {name}{cause}"
     try:
-        raise_on_all_ranks(comm, problem, FxcrackError)
+        raise_on_all_ranks(comm, problem, kind)
     except FxcrackError as error:
         raise error from cause

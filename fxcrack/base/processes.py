@@ -27,7 +27,8 @@ def command(module: str, words: list[str], ranks: int) -> list[str] | None:
     Returns:
         ``None`` if several ranks are asked for and no launcher is there.
     """
-    python = [sys.executable, "-m", module, *words]
+    # -P: a file of the present folder that is called as a module of Python is not imported
+    python = [sys.executable, "-P", "-m", module, *words]
     if ranks == 1:
         return python
     found = launcher()

@@ -103,8 +103,10 @@ def estimate(
     Raises:
         InputError: The method is unknown, ranks is not positive, or iterative in 2-D.
     """
-    if method not in METHODS or ranks < 1:
-        raise InputError(f"method = '{method}', ranks = {ranks}: choose direct or iterative, >= 1")
+    if method not in METHODS:
+        raise InputError(f"method = '{method}': choose direct or iterative")
+    if ranks < 1:
+        raise InputError(f"ranks = {ranks}: choose at least 1")
     if method == "iterative" and task.dim == 2:
         raise InputError("the iterative method is not modelled in 2-D: the direct one always wins")
     c = shipped() if constants is None else constants

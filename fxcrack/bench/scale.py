@@ -67,8 +67,10 @@ class ScaleCase:
             raise InputError(f"shape = '{self.shape}': choose one of {', '.join(SHAPES)}")
         if self.method not in ("schur", "iterative"):
             raise InputError(f"method = '{self.method}': choose schur or iterative")
-        if not 500 <= self.dofs <= 1e9 or self.ranks < 1:
-            raise InputError(f"dofs = {self.dofs}, ranks = {self.ranks}: choose sensible numbers")
+        if not 500 <= self.dofs <= 1e9:
+            raise InputError(f"sizes: {self.dofs:g} dofs; choose sizes from 500 to 1e9")
+        if self.ranks < 1:
+            raise InputError(f"ranks = {self.ranks}: choose at least 1")
 
     @property
     def dim(self) -> int:

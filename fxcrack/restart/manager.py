@@ -21,6 +21,8 @@ from mpi4py import MPI
 
 from fxcrack.base import log
 from fxcrack.base.errors import FxcrackError, InputError, raise_on_all_ranks
+from fxcrack.base.files import check_writable
+from fxcrack.base.parallel import all_or_none
 from fxcrack.base.signals import Interrupted, Listener
 from fxcrack.restart.checkpoint import Checkpoint, Saved, next_of_folder, read, write
 from fxcrack.restart.fingerprint import differences, fingerprint, summary
@@ -97,6 +99,12 @@ class RestartManager:
         self._comm = analysis.comm
         self._checkpoint = checkpoint
         self._file = None if save is None else HistoryFile(analysis.history, save)
+        with all_or_none(self._comm, "before the run", InputError):
+            if self._comm.rank == 0:
+                if save is not None:
+                    check_writable("save", save)
+                if checkpoint is not None:
+                    check_writable("the checkpoint", checkpoint.file(files.steps))
         self._listener = Listener()
         self._stack = ExitStack()
         self._count, self._last = 0, time.monotonic()
