@@ -56,6 +56,7 @@ from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
 from fxcrack.mesh import Mesh, Split, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
+from fxcrack.output.plies import PlyResults, ply_results
 from fxcrack.output.tables import (
     BondHistory,
     bond_table,
@@ -151,6 +152,7 @@ __all__ = [
     "PlaneStress",
     "Plastic",
     "Ply",
+    "PlyResults",
     "PointForce",
     "PointMoment",
     "Power",
@@ -179,6 +181,7 @@ __all__ = [
     "checkpoints",
     "displacement_function",
     "mesh_from_gmsh",
+    "ply_results",
     "read_mesh",
     "tip_table",
     "write_fields",

@@ -163,7 +163,7 @@ class Continuum:
         n_cells = int(index_map.size_local)
         if isinstance(materials, Mapping):
             groups = self._groups(materials)
-            names = [f"'{name}'" for name in materials]
+            names = list(materials)
             self.part_materials = list(materials.values())
         else:
             groups = [np.arange(n_cells + index_map.num_ghosts, dtype=np.int32)]
@@ -226,17 +226,17 @@ class Continuum:
         """Refuse a continuum shell that this continuum cannot hold."""
         if self.gdim != 3:
             raise InputError(
-                f"ContinuumShell of {name}: it needs a mesh of hexahedra in three dimensions, and "
+                f"ContinuumShell of '{name}': it needs a mesh of hexahedra, in 3-D, and "
                 f"mesh '{self.mesh.name}' is plane; give a solid material"
             )
         if self.order != 2:
             raise InputError(
-                f"ContinuumShell of {name}: its displacement is of second order (27 nodes); give "
+                f"ContinuumShell of '{name}': its displacement is of second order (27 nodes); give "
                 "Scene(order=2), or mesh with second-order cells where the shell is curved"
             )
         if self.temperature is not None:
             raise InputError(
-                f"ContinuumShell of {name}: temperature is not known to continuum shells yet; "
+                f"ContinuumShell of '{name}': temperature is not known to continuum shells yet; "
                 "model the group with solid cells (laminate.layers), or leave Temperature out"
             )
 

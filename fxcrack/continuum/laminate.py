@@ -33,6 +33,8 @@ _IN, _OUT = [0, 1, 5], [2, 3, 4]
 _ODD_ANGLE = 37.0
 """Degrees; no layer of fibres is symmetric about it."""
 _ROUND_OFF = 1e-10
+_SLIVER = 1e-9
+"""Part of the thickness that a ply must have."""
 
 
 @dataclass(frozen=True)
@@ -76,6 +78,10 @@ class Ply:
     def to_ply(self, strain: Array) -> Array:
         """Strains in the axes of the ply of strains in those of the laminate, shape (..., 6)."""
         return np.asarray(strain @ self._turn().T)
+
+    def stress_to_ply(self, stress: Array) -> Array:
+        """Stresses in the axes of the ply of stresses in those of the laminate, shape (..., 6)."""
+        return np.asarray(stress @ np.linalg.inv(self._turn()))
 
     def _own(self) -> Material:
         if self.material is None:
@@ -203,6 +209,8 @@ class Laminate:
     def part(self, low: float, high: float) -> Laminate:
         """The plies, whole or cut, between two fractions of the thickness from the bottom.
 
+        What is thinner than round-off is left out.
+
         Args:
             low: Where the part begins, 0 at the bottom.
             high: Where it ends, 1 at the top.
@@ -210,8 +218,17 @@ class Laminate:
         z = self.interfaces() / self.thickness + 0.5
         cut = np.diff(np.clip(z, low, high)) * self.thickness
         return self._stacked(
-            tuple(replace(p, thickness=t) for p, t in zip(self.plies, cut, strict=True) if t > 0.0)
+            tuple(
+                replace(p, thickness=t)
+                for p, t in zip(self.plies, cut, strict=True)
+                if t > _SLIVER * self.thickness
+            )
         )
+
+    def plies_below(self, fraction: float) -> int:
+        """Number of plies that end below a fraction of the thickness from the bottom."""
+        ends = self.interfaces()[1:] / self.thickness + 0.5
+        return int(np.sum(ends <= fraction + _SLIVER))
 
     @property
     def is_isotropic_in_plane(self) -> bool:

@@ -52,14 +52,18 @@ class ShellCells:
         name: What messages call the cells.
 
     Attributes:
+        name: The group.
         stacking: Thickness direction of each cell.
         layers: The part of the laminate in each layer of cells, bottom first.
+        first_plies: Number of the first ply in each layer, from 0.
         shear_factors: (k13, k23) in use.
         thickness: Mean thickness of the group, length.
+        heights: Thickness of each cell of ``stacking.cells``, length.
         size: Mean side of a cell in the plane, length.
         zeta: Thickness coordinate, a UFL coefficient.
         axes: Unit vectors e1, e2, e3, UFL.
         stiffness: In global axes, UFL, shape (6, 6), force/length^2.
+        strain_rotation: Takes Voigt strains from global to laminate axes, UFL, shape (6, 6).
 
     Raises:
         InputError: The cells do not lie between bottom and top (:mod:`stacking`), or the axis is
@@ -70,13 +74,14 @@ class ShellCells:
         self, mesh: Mesh, cells: npt.NDArray[np.integer], shell: ContinuumShell, name: str
     ) -> None:
         self.shell = shell
-        self._mesh, self._name = mesh, name
+        self._mesh, self.name = mesh, name
         self.stacking = find_stacking(mesh, cells, shell.bottom, shell.top, name)
         domain = mesh.domain
         self._each_cell = fem.functionspace(domain, ("DG", 0))
         self._dofs = _dofs_of(self._each_cell, self.stacking.cells)
         self.zeta = self._coordinate()
         volume, area = self._measured()
+        self.heights = volume / area
         self._weight = fem.Function(self._each_cell)
         self._weight.x.array[self._dofs] = np.minimum(1.0, (volume / area) ** 2 / area)
         self.layers = self._divided(volume, area)
@@ -132,15 +137,16 @@ class ShellCells:
             ratio = self.thickness / laminate.thickness
             if abs(ratio - 1.0) > _SAME_THICKNESS:
                 log.warn(
-                    "ContinuumShell of %s: the plies are %.6g thick together, the cells %.6g; the "
-                    "plies are taken %.4g times as thick as they were given",
-                    self._name,
+                    "ContinuumShell of '%s': the plies are %.6g thick together, the cells %.6g; "
+                    "the plies are taken %.4g times as thick as they were given",
+                    self.name,
                     laminate.thickness,
                     self.thickness,
                     ratio,
                 )
         ends = np.concatenate([[0.0], np.cumsum(thickness)]) / self.thickness
         ends[-1] = 1.0
+        self.first_plies = [laminate.plies_below(end) for end in ends[:-1]]
         if on.n_layers == 1:
             return [laminate]
         return [laminate.part(a, b) for a, b in pairwise(ends)]
@@ -174,7 +180,7 @@ class ShellCells:
             wrong = None
             if given.shape != x.T.shape or not np.all(np.isfinite(given)):
                 wrong = (
-                    f"ContinuumShell of {self._name}: axis gives shape {given.shape} at positions "
+                    f"ContinuumShell of '{self.name}': axis gives shape {given.shape} at positions "
                     f"of shape {x.T.shape}; return finite directions of the same shape"
                 )
             raise_on_all_ranks(self._mesh.comm, wrong)
@@ -187,7 +193,7 @@ class ShellCells:
         if len(bad):
             nodes = compat.geometry_dofmap(domain)[on.cells[bad[0]]]
             problem = (
-                f"ContinuumShell of {self._name}: axis is along the normal of {len(bad)} cells, "
+                f"ContinuumShell of '{self.name}': axis is along the normal of {len(bad)} cells, "
                 f"the first about {format_point(domain.geometry.x[nodes].mean(axis=0))}; give "
                 "another direction, or a function of position"
             )
@@ -236,7 +242,7 @@ class ShellCells:
         k13, k23 = self.shear_factors
         n_plies = len(self.shell.laminate.plies)
         return (
-            f"{self._name}: continuum shell, {n_plies} {'ply' if n_plies == 1 else 'plies'}, "
+            f"{self.name}: continuum shell, {n_plies} {'ply' if n_plies == 1 else 'plies'}, "
             f"{len(self.layers)} {'cell' if len(self.layers) == 1 else 'cells'} over the thickness "
             f"{self.thickness:.4g}, side over thickness of a cell "
             f"{self.size * len(self.layers) / self.thickness:.3g}, shear factors {k13:.4g} and "

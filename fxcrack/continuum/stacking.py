@@ -63,7 +63,7 @@ def find_stacking(
     topology = mesh.domain.topology
     if topology.cell_name() != "hexahedron":
         raise InputError(
-            f"ContinuumShell of {name}: its cells must be hexahedra, and mesh '{mesh.name}' "
+            f"ContinuumShell of '{name}': its cells must be hexahedra, and mesh '{mesh.name}' "
             f"has cells of kind {topology.cell_name()}; recombine the mesh, or use solid materials"
         )
     topology.create_entities(2)
@@ -170,7 +170,7 @@ class _Columns:
         where = ", ".join(format_point(x) for x in centres)
         raise_on_all_ranks(
             comm,
-            f"ContinuumShell of {self._name}: {n_wrong} of its cells, about {where}, {why}"
+            f"ContinuumShell of '{self._name}': {n_wrong} of its cells, about {where}, {why}"
             if len(found)
             else None,
         )

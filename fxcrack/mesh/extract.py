@@ -1,7 +1,8 @@
 """The arrays of a gmsh model: cells, points and physical groups as a :class:`RawMesh`.
 
 An entity may belong to any number of groups; nodes that no cell uses (points of the geometry) are
-dropped; gaps in gmsh's numbering are closed.
+dropped; gaps in gmsh's numbering are closed; second-order quadrilaterals and hexahedra without
+centre nodes get them.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dolfinx.mesh import CellType
 from fxcrack.base.arrays import Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import MeshError
+from fxcrack.mesh.complete import INCOMPLETE, Completion
 from fxcrack.mesh.raw import Floats, RawGroup, RawMesh, distinct
 
 _CELLS = {
@@ -27,7 +29,6 @@ _CELLS = {
     11: ("tetrahedron", 2),
     12: ("hexahedron", 2),
 }
-_INCOMPLETE = (16, 17)
 _PLANE = 1e-9
 
 
@@ -41,7 +42,7 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
     Raises:
         MeshError: No cells or unsupported ones, a plane mesh out of z = 0, unusable groups.
     """
-    cell, order, tdim, tags, cells = _cells(model)
+    cell, order, tdim, tags, cells, incomplete = _cells(model)
     if gdim is not None and gdim not in (tdim, 3):
         raise MeshError(
             f"the cells are {tdim}-dimensional, but gdim={gdim} was asked for; leave gdim out, or "
@@ -56,6 +57,9 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
     used, flat = np.unique(cells, return_inverse=True)
     nodes = flat.reshape(len(tags), -1).astype(np.int64)
     points = coordinates[np.searchsorted(node_tags, used)]
+    completion = Completion(cell, points, nodes) if incomplete else None
+    if completion is not None:
+        points, nodes = completion.points, completion.nodes
     _check_plane(points, gdim)
     nodes = nodes[:, compat.gmsh_cell_permutation(getattr(CellType, cell), nodes.shape[1])]
     raw = RawMesh(cell, order, np.ascontiguousarray(points[:, :gdim]), nodes)
@@ -81,6 +85,8 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
                 "of the group, or embed it in the mesh (gmsh.model.mesh.embed, or fragment)"
             )
         width = raw.n_entity_nodes(dim)
+        if completion is not None and dim == 2 and len(index) == 8 * len(element_tags):
+            index = completion.facets(index.reshape(-1, 8), label).ravel()
         if len(index) % width or len(element_tags) != len(index) // width:
             raise MeshError(
                 f"{label} holds elements that are no parts of a {cell} of order {order}; mesh "
@@ -92,8 +98,8 @@ def extract(model: Any, gdim: int | None) -> RawMesh:
     return raw
 
 
-def _cells(model: Any) -> tuple[str, int, int, Ints, Ints]:
-    """Cell shape, order, dimension, element tags and flat node tags of the cells."""
+def _cells(model: Any) -> tuple[str, int, int, Ints, Ints, bool]:
+    """Cell shape, order, dimension, element tags, flat node tags, and whether nodes are missing."""
     tdim = max((d for d in (1, 2, 3) if len(model.mesh.getElementTypes(d))), default=0)
     if tdim < 2:
         raise MeshError(
@@ -107,19 +113,15 @@ def _cells(model: Any) -> tuple[str, int, int, Ints, Ints]:
             f"the cells are of {len(types)} kinds ({', '.join(names)}), but a mesh must have one; "
             f"recombine all surfaces or none (gmsh.model.mesh.setRecombine)"
         )
-    if types[0] in _INCOMPLETE:
-        raise MeshError(
-            f"second-order cells without centre nodes ({names[0]}) are not supported; set "
-            f"Mesh.SecondOrderIncomplete = 0 before gmsh.model.mesh.setOrder(2)"
-        )
-    if types[0] not in _CELLS:
+    incomplete = types[0] in INCOMPLETE
+    if not incomplete and types[0] not in _CELLS:
         raise MeshError(
             f"cells of kind {names[0]} are not supported; use first- or second-order triangles, "
             f"quadrilaterals, tetrahedra or hexahedra"
         )
     tags, nodes = model.mesh.getElementsByType(types[0])
-    cell, order = _CELLS[types[0]]
-    return cell, order, tdim, tags.astype(np.int64), nodes.astype(np.int64)
+    cell, order = (INCOMPLETE[types[0]], 2) if incomplete else _CELLS[types[0]]
+    return cell, order, tdim, tags.astype(np.int64), nodes.astype(np.int64), incomplete
 
 
 def _check_plane(points: Floats, gdim: int) -> None:

@@ -28,6 +28,7 @@ class Explanation:
         counts: Form terms, compiled forms, factorisations, nonlinear iterations so far.
         phases: Seconds of the runs so far, by phase of the solution.
         costs: Seconds of the runs so far, by effect.
+        groups: Integration, plies, slenderness and shear factors of groups of continuum shells.
     """
 
     solver: str
@@ -37,6 +38,7 @@ class Explanation:
     counts: dict[str, int]
     phases: dict[str, float]
     costs: dict[str, float]
+    groups: tuple[str, ...] = ()
 
     @property
     def path(self) -> str:
@@ -53,6 +55,7 @@ class Explanation:
         """Several lines for a terminal."""
         lines = [f"solver: {self.solver}, because {'; '.join(self.why)}"]
         lines.append("effects: " + ("; ".join(self.effects) or "none beyond linear elasticity"))
+        lines += self.groups
         lines.append("unknowns: " + _listed(self.unknowns))
         lines.append("counted: " + _listed(self.counts))
         for title, table in (("phases", self.phases), ("effects", self.costs)):
@@ -96,7 +99,10 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
         costs = {**bodies.seconds, **costs}
     plan = analysis.plan
     seconds = dict(solver.timings.seconds)
-    return Explanation(plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs)
+    groups = tuple(str(cells) for cells in analysis.continuum.shell_cells.values())
+    return Explanation(
+        plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, groups
+    )
 
 
 def _listed(table: dict[str, int]) -> str:
