@@ -146,6 +146,11 @@ def test_loads_have_their_resultants(comm: MPI.Intracomm) -> None:
         assert reaction == pytest.approx(wanted, rel=1e-9), load
 
 
+def run(one: fx.Scene) -> fx.Scene:
+    one.run(fx.Static(until=fx.Time(1.0)), progress=False)
+    return one
+
+
 FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
     "solid on a surface": (lambda c: scene(plate(c), model=fx.Solid()), "dimension 3"),
     "shell on a volume": (
@@ -186,6 +191,35 @@ FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
         lambda c: scene(plate(c, surface=lambda a, b: (a, b, 3.0 * np.abs(a - 2.0)))),
         "kink",
     ),
+    "iterative": (
+        lambda c: scene(plate(c), options=fx.CondensedOptions(method="iterative")),
+        "not possible with shells",
+    ),
+    "picture of stress": (
+        lambda c: fx.plots.deformed(run(scene(plate(c))), "deformed.png"),
+        "both faces",
+    ),
+    "temperature": (
+        lambda c: scene(plate(c), effects=[fx.Temperature(100.0)]),
+        "not possible in shells",
+    ),
+    "inertia": (lambda c: scene(plate(c), effects=[fx.Inertia()]), "not possible in shells"),
+    "pressure that follows": (
+        lambda c: scene(plate(c), loads=[fx.Pressure(fx.Face("plate", "top"), 1.0, follows=True)]),
+        "keeps its direction",
+    ),
+    "moment on a solid": (
+        lambda c: run(
+            fx.Scene(
+                dcb_3d(c, length=3.0, width=1.0, dx=1.0, dy=1.0, ny=1),
+                model=fx.Solid(),
+                materials=ALLOY,
+                supports=[fx.Clamp("far_upper"), fx.Clamp("far_lower")],
+                loads=[fx.Moment("end_upper", (0.0, 1.0, 0.0))],
+            )
+        ),
+        "only shells take moments",
+    ),
     "rotation of a solid": (
         lambda c: fx.Scene(
             dcb_3d(c, length=3.0, width=1.0, dx=1.0, dy=1.0, ny=1),
@@ -220,3 +254,10 @@ def test_sections_refuse(arguments: dict[str, Any], words: str) -> None:
     given: dict[str, Any] = {"material": ALLOY, "thickness": 1.0}
     with pytest.raises(fx.InputError, match=words):
         fx.Section(**{**given, **arguments})
+
+
+def test_a_shell_explains_itself(comm: MPI.Intracomm) -> None:
+    one = run(scene(plate(comm), effects=[fx.FiniteStrain()]))
+    text = str(one.explain())
+    assert "shells of large rotation" in text
+    assert "finite strain" in text

@@ -92,9 +92,7 @@ class ShellBodies(Continuum):
         temperature: Temperature | None = None,
     ) -> None:
         if temperature is not None:
-            raise InputError(
-                "Temperature is not possible in shells yet; model the part with solids"
-            )
+            raise InputError("Temperature is not possible in shells; model the part with solids")
         super().__init__(mesh, materials, model, order=order)
         self.shell = model
         kind = mesh.domain.topology.cell_name()

@@ -53,8 +53,16 @@ def stress_function(source: Analysis | HasAnalysis, u: fem.Function, time: float
         source: A scene or its analysis, after a step.
         u: Its displacement.
         time: Its time, which determines the temperature.
+
+    Raises:
+        InputError: The bodies are shells, whose stress is not the same over the thickness.
     """
     analysis = analysis_of(source)
+    if isinstance(analysis.continuum, ShellBodies):
+        raise InputError(
+            "a shell has no one stress over its thickness: write_fields() gives the stresses on "
+            "both faces and the section forces, fxcrack.continuum.shell_stress the same as arrays"
+        )
     if isinstance(analysis.solver, NewtonSolver):
         return analysis.solver.bodies.stress()
     continuum = analysis.continuum

@@ -13,7 +13,7 @@ from petsc4py import PETSc
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import ComesApart
+from fxcrack.base.errors import ComesApart, InputError
 from fxcrack.base.machine import machine_memory_mb
 from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
 from fxcrack.condensation.cost_laws import too_large_for_direct
@@ -24,6 +24,7 @@ from fxcrack.condensation.retained import ColumnCost, CostModel
 from fxcrack.condensation.rigid_motions import check_held
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, work_between
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -72,6 +73,11 @@ class LinearSolver(InterfaceSolver):
         self.borders: list[PETSc.Vec] = []
         self.condensation: DirectCondensation | IterativeCondensation | None = None
         self.columns: SchurColumnCache | None = None
+        if options.method == "iterative" and isinstance(continuum, ShellBodies):
+            raise InputError(
+                "CondensedOptions(method='iterative') is not possible with shells, whose stiffness "
+                "against bending and stretching differs too much; leave method out"
+            )
         if options.method == "iterative" or (options.method == "auto" and self._too_large()):
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(
@@ -82,7 +88,7 @@ class LinearSolver(InterfaceSolver):
 
     def _too_large(self) -> bool:
         """Whether a factorisation would not fit the memory, which is logged; collective."""
-        if self.continuum.gdim < 3:
+        if self.continuum.gdim < 3 or isinstance(self.continuum, ShellBodies):
             return False
         comm = self.continuum.comm
         reason = too_large_for_direct(self.continuum.n_global, 1e6 * machine_memory_mb(comm))
