@@ -18,7 +18,7 @@ from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.extract import extract
 from fxcrack.mesh.mesh import Mesh
 from fxcrack.mesh.raw import RawMesh, check_shapes, on_root
-from fxcrack.mesh.split import Split, split_surface
+from fxcrack.mesh.split import Split, in_order, split_surface
 
 
 def read_mesh(
@@ -138,7 +138,7 @@ def prepare(model: Any, name: str, gdim: int | None = None, split: Sequence[Spli
     try:
         raw = extract(model, gdim)
         check_shapes(raw)
-        for one in split:
+        for one in in_order(raw, split):
             raw = split_surface(raw, one)
     except MeshError as error:
         raise MeshError(f"mesh '{name}': {error}") from error
