@@ -462,3 +462,25 @@ def test_cycles_settle_with_friction(comm: MPI.Intracomm) -> None:
         spans.append(history.rows[-1]["dG[bond]"])
     # friction takes shear off at the maximum and leaves some at the minimum
     assert 0.9 * spans[0] < spans[1] < 0.99 * spans[0]
+
+
+@pytest.mark.slow
+def test_many_closed_nodes_do_not_switch_one_by_one() -> None:
+    """1,500 nodes that touch: forces at round-off far from the load are no thousands of events."""
+    length = 15.0
+    bond = fx.Interface(
+        "upper_face", "lower_face", lambda x: x[0] >= length - 1.0 - 1e-9, contact=True,
+        friction=0.3, name="b",
+    )  # fmt: skip
+    scene = fx.Scene(
+        dcb_2d(MPI.COMM_SELF, length=length, dx=0.01, ny=1, height=1.0),
+        materials=fx.Isotropic(70e3, 0.3),
+        model=fx.PlaneStrain(),
+        supports=[fx.Displacement("bottom", x=0.0, y=0.0)],
+        loads=[fx.Pressure("top", 1.0), fx.Traction("end_upper", (0.5, 0.0))],
+        debonds=[fx.Debond(bond, fx.VCCT(GIc=1e9))],
+    )
+    history = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)
+    assert scene.solver.system.friction.steps < 300
+    work = np.abs(history["external_work"].astype(float)).max()
+    assert np.abs(history["balance"].astype(float)).max() < 1e-8 * work

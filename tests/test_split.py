@@ -193,6 +193,22 @@ def test_second_split_crosses_the_first() -> None:
         assert len(new.groups[name].rows) == 4
 
 
+@pytest.mark.parametrize("cell", ["triangle", "tetrahedron"])
+def test_surface_that_ends_on_another_in_any_order(cell: str) -> None:
+    """A ply crack on a delamination: three pieces around its end, whichever is given first."""
+    model, _ = grid(cell, 1)
+    add(model, "a", everywhere, y=2.0)
+    add(model, "b", lambda x: x[:, 1] > 2.0 - 1e-9, x=2.0)
+    splits = (
+        Split("a", "a+", "a-", (0, 1, 0)[: dimension(cell)]),
+        Split("b", "b+", "b-", (1, 0, 0)[: dimension(cell)]),
+    )
+    one, other = raw_mesh(model, *splits), raw_mesh(model, *splits[::-1])
+    assert np.array_equal(one.points, other.points) and np.array_equal(one.cells, other.cells)
+    at = np.isclose(one.points[:, :2], 2.0).all(axis=1)
+    assert at.sum() == 3 * len(np.unique(one.points[at], axis=0))
+
+
 def closed_surface(model: Blocks) -> None:
     """The boundary of the middle box of a 3 x 3 grid."""
     for axis in "xy":

@@ -29,6 +29,9 @@ from fxcrack.equilibrium.jump_system import Equilibrium, JumpSystem, blend
 
 _SAME = 1e-12
 """Events closer together than this fraction of the way happen at once."""
+_STUCK = 60
+"""Changes at one load after which an increment of backward Euler finds the states of all nodes at
+once: one by one, forces at round-off far from the load could be changed thousands of times."""
 _NUDGE = 1e-3
 """Fraction of the way done by backward Euler where following gets stuck."""
 _SMALLEST = 1.0 / 128.0
@@ -117,7 +120,7 @@ class _Way:
         while True:
             done += 1
             found = None
-            if stuck > 20 + 4 * m or done > most:
+            if stuck > min(20 + 4 * m, _STUCK) or done > most:
                 x = self.at + min(_NUDGE * 4.0**nudges, 1.0) * (1.0 - self.at)
                 x = 1.0 if x > 1.0 - _SAME or done > most else x
                 found = friction.increment(self.block, self._load(x))

@@ -19,7 +19,7 @@ from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.extract import extract
 from fxcrack.mesh.mesh import Mesh
 from fxcrack.mesh.raw import RawMesh, check_shapes, on_root
-from fxcrack.mesh.split import Split, split_surface
+from fxcrack.mesh.split import Split, in_order, split_surface
 
 _READABLE = (".msh", ".unv", ".med", ".cgns")
 """Mesh files that gmsh reads with their groups."""
@@ -157,7 +157,7 @@ def prepare(model: Any, name: str, gdim: int | None = None, split: Sequence[Spli
                 "a surface mesh in space has no internal surfaces to split; mesh the two shells of "
                 "an interface apart, each with its own nodes, and leave split out"
             )
-        for one in split:
+        for one in in_order(raw, split):
             raw = split_surface(raw, one)
     except MeshError as error:
         raise MeshError(f"mesh '{name}': {error}") from error

@@ -8,6 +8,7 @@ there is one piece only: such nodes, where the two sides remain connected, are n
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -138,6 +139,58 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
         groups[name] = RawGroup(raw.tdim - 1, rows[parted])
     points = np.concatenate((raw.points, raw.points[doubled]))
     return replace(raw, points=points, cells=cells, groups=groups)
+
+
+_EDGES = {2: ((0,), (1,)), 3: ((0, 1), (1, 2), (0, 2))}
+"""Ends of an interval and edges of a triangle, by corners."""
+
+
+def in_order(raw: RawMesh, splits: Sequence[Split]) -> list[Split]:
+    """Splits in an order that does: a surface that ends on another one comes after it.
+
+    Split first, a ply crack that ends on a delamination would leave three pieces around its end.
+
+    Args:
+        raw: The whole mesh.
+        splits: As they were given, names not checked yet.
+
+    Returns:
+        The same ones, otherwise in the order given.
+    """
+    known = [s for s in splits if s.surface in raw.groups]
+    parts = {s.surface: _border_and_inside(raw, s.surface) for s in known}
+    left, out = list(splits), []
+    while left:
+        first = next((s for s in left if not _ends_on(s, left, parts)), left[0])
+        left.remove(first)
+        out.append(first)
+    return out
+
+
+def _ends_on(split: Split, others: list[Split], parts: dict[str, tuple[Ints, Ints]]) -> bool:
+    """Whether the border of a surface has nodes inside one of some other surfaces."""
+    none = np.zeros(0, dtype=np.int64)
+    border = parts.get(split.surface, (none, none))[0]
+    return any(
+        np.isin(border, parts.get(o.surface, (none, none))[1]).any()
+        for o in others
+        if o.surface != split.surface
+    )
+
+
+def _border_and_inside(raw: RawMesh, surface: str) -> tuple[Ints, Ints]:
+    """Corner nodes on the border of a surface, and the others of it."""
+    group = raw.groups[surface]
+    if group.dim != raw.tdim - 1 or group.dim == 0:
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    corners = group.rows[:, : raw.n_vertices(group.dim)]
+    edges = _EDGES.get(corners.shape[1])
+    if edges is None:  # quadrilaterals: the order of the splits is the user's
+        return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
+    ends = np.sort(np.concatenate([corners[:, list(edge)] for edge in edges]), axis=1)
+    every, counts = np.unique(ends, axis=0, return_counts=True)
+    border = np.unique(every[counts == 1])
+    return border, np.setdiff1d(corners, border)
 
 
 def _check_names(raw: RawMesh, split: Split) -> None:
