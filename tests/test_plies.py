@@ -205,8 +205,9 @@ def test_free_plates_at_a_temperature(case: str, finite: bool) -> None:
             expected[inner][..., :2], abs=0.03 * scale
         )
     assert np.abs(found.forces[:, :6]).max() < 0.02 * scale * 0.5
-    # the work of the temperature is what is stored
+    # the work of the temperature is what is stored; at finite strain the trapezoidal rule adds up
+    # to 1e-5 of it in each increment (NewtonOptions.balance)
     energy = scene.history.rows[-1]
     assert energy["strain_energy"] > 0.0
-    assert abs(energy["balance"]) < 1e-8 * energy["strain_energy"]
+    assert abs(energy["balance"]) < (1e-4 if finite else 1e-8) * energy["strain_energy"]
     scene.close()
