@@ -21,6 +21,7 @@ def front(nodes, area):
     return Tips(
         np.array(nodes), none[..., 0].astype(int), none.astype(int), none, np.zeros((n, 3, 3)),
         zero, zero, zero, np.array(area, dtype=float),
+        none[:, 0].astype(int), none[:, 0], zero, zero == 0.0,
     )  # fmt: skip
 
 

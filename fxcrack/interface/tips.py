@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.surface import FacetSurface
 
 
@@ -25,6 +25,11 @@ class Tip:
         d_behind: Distance to the wake point, length.
         width: Front length (times thickness or ring) the node stands for, length.
         area: Area that opens when the node is released, length^2.
+        further_nodes: Two nodes of the next corner point behind the wake point, shape (2,).
+        further_weights: Their weights, shape (2,).
+        d_further: Distance of that point along the surface, 0 where none is open, length.
+        straight: Whether ``d_ahead`` and ``d_behind`` lie on one line through the node; not so
+            where the growth direction points out of the surface at its edge.
     """
 
     node: int
@@ -36,6 +41,10 @@ class Tip:
     d_behind: float
     width: float
     area: float
+    further_nodes: Ints
+    further_weights: Array
+    d_further: float
+    straight: bool
 
 
 @dataclass(frozen=True)
@@ -51,6 +60,10 @@ class Tips:
     d_behind: Array
     width: Array
     area: Array
+    further_nodes: Ints
+    further_weights: Array
+    d_further: Array
+    straight: Bools
 
     def __len__(self) -> int:
         """Number of tips."""
