@@ -1,7 +1,8 @@
 """Extent of a crack: open length along a line, or open area over the front width.
 
 2-D: the length of the open run that ends at a tip, measured along the slave surface from the end
-of the surface; half of it when both its ends are tips.
+of the surface; half of it when both its ends are tips, or were before the crack came to the end of
+the surface. Lines that close on themselves have no end, and a run there has two tips.
 3-D: open area divided by the length of the initial front; the facets cut by the front count half.
 """
 
@@ -28,6 +29,7 @@ class CrackExtent:
         tips = front.tips()
         self._front_length = float(tips.width.sum()) if len(tips) else 0.0
         self._known: tuple[int, list[tuple[int, float]]] = (-1, [])
+        self._was_bonded = front.bonded.copy()
         if self._line:
             self._paths = [_along(path, surface.x) for path in _polylines(surface.facets[:, :2])]
 
@@ -56,18 +58,31 @@ class CrackExtent:
         out: list[tuple[int, float]] = []
         for nodes, s in self._paths:
             bonded = self._front.bonded[nodes]
+            closed = nodes[0] == nodes[-1]
+            if closed and bonded.any():
+                # a closed line is walked from a bonded node on, so that no run is cut in two
+                begin = int(np.argmax(bonded))
+                steps = np.roll(np.diff(s), -begin)
+                nodes = np.append(np.roll(nodes[:-1], -begin), nodes[begin])
+                s, bonded = np.concatenate([[0.0], np.cumsum(steps)]), self._front.bonded[nodes]
             # runs of open nodes; each reaches to the bonded nodes on both sides
             edge = np.flatnonzero(np.diff(np.concatenate([[True], bonded, [True]]).astype(int)))
             for first, stop in edge.reshape(-1, 2):
                 left, right = max(first - 1, 0), min(stop, len(nodes) - 1)
-                tips = [int(nodes[k]) for k in {left, right} if bonded[k]]
                 total = float(s[right] - s[left])
-                out += [(tip, total / len(tips)) for tip in sorted(tips)] or [(-1, total)]
+                ends = nodes[[left, right]]
+                grew = 2 if closed else int(self._was_bonded[ends].sum())
+                tips = {int(k) for k in ends if self._front.bonded[k]}
+                a = total / max(grew, 1)
+                out += [(tip, a) for tip in sorted(tips)] or [(-1, a)]
         return out
 
 
 def _polylines(ends: Ints) -> list[Ints]:
-    """Corner nodes of a line of facets in order, one array per connected piece."""
+    """Corner nodes of a line of facets in order, one array per connected piece.
+
+    A closed line ends with the node it begins with.
+    """
     around: dict[int, list[int]] = {}
     for a, b in ends.tolist():
         around.setdefault(a, []).append(b)
@@ -86,6 +101,8 @@ def _polylines(ends: Ints) -> list[Ints]:
             here = nxt[0]
             path.append(here)
             left.discard(here)
+        if len(path) > 2 and start in around[here]:
+            path.append(start)
         out.append(np.array(path))
     return out
 

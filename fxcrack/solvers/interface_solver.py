@@ -177,6 +177,22 @@ class InterfaceSolver(ABC):
         self.system.restore(saved.states)
         self.state, self.friction_energy = saved.equilibrium, saved.friction_energy
 
+    def undo(self, saved: InterfaceState, rebases: int) -> None:
+        """Return to an earlier state of the interfaces, be the retained jumps others since.
+
+        Collective.
+
+        Args:
+            saved: The state.
+            rebases: Value of :attr:`rebases` then.
+        """
+        if self.rebases == rebases:
+            self.restore_interfaces(saved)
+            return
+        saved.restore_bonds(self.fronts)
+        self._retain(saved)
+        self.rebases += 1
+
     def _resume(self, state: InterfaceState) -> None:
         """Take a state that the next :meth:`prepare` carries over."""
         state.restore_bonds(self.fronts)
