@@ -159,9 +159,10 @@ class Front:
         """Area swept over a corner node of a line, the open corner behind it given."""
         facets = self._undeformed.facets
         areas = self._facet_areas
-        (ahead,) = (int(f) for f in self._facets_of[node] if behind not in facets[f])
-        (back,) = (int(f) for f in self._facets_of[node] if behind in facets[f])
-        (end,) = (int(k) for k in facets[ahead, :2] if k != node)
+        around = [int(f) for f in self._facets_of[node]]
+        ahead = next(f for f in around if behind not in facets[f])
+        back = next(f for f in around if behind in facets[f])
+        end = next(int(k) for k in facets[ahead, :2] if k != node)
         beyond = next((int(f) for f in self._facets_of[end] if f != ahead), ahead)
         grown = bool(self._was_bonded[behind])
         return swept(
