@@ -19,6 +19,7 @@ from __future__ import annotations
 import csv
 import json
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, overload
 
@@ -117,6 +118,65 @@ class History:
             f"there is no row with {column} >= {value:g} among {len(chosen)} rows"
             f"{'' if event is None else f' of event {event!r}'}; the largest is {most}"
         )
+
+    def load_at(
+        self,
+        opening: npt.ArrayLike,
+        *,
+        x: str | None = None,
+        y: str | None = None,
+        event: str = "onset",
+    ) -> npt.NDArray[np.float64]:
+        """Load at an opening, interpolated over the rows of one event.
+
+        Between two releases a load lies on a saw-tooth; at the onsets it is that of growth. The way
+        from the first row of the history to the first onset is a straight line.
+
+        Args:
+            opening: Values of the column ``x``, of any shape.
+            x: Column; by default the first prescribed displacement that moves, else the
+                displacement of the first load.
+            y: Column; by default the reaction or load that belongs to it.
+            event: Rows to interpolate over.
+
+        Returns:
+            Values of the column ``y`` where ``x`` has the given values for the first time, of the
+            shape of ``opening``.
+
+        Raises:
+            InputError: A column is unknown, no row is of that event, or the values lie outside.
+        """
+        if x is None:
+            moving = [c for c in self.columns if c[:2] in ("u[", "v[")]
+            if not moving:
+                raise InputError("load_at: no displacement is prescribed or loaded; give x and y")
+            x = moving[0]
+        if y is None:
+            y = {"u[": "R[", "v[": "F["}.get(x[:2], "") + x[2:]
+        for name in (x, y):
+            if name not in self.columns:
+                unknown_name("column", name, self.columns)
+        rows = self.rows[:1] + [r for r in self.rows[1:] if r["event"] == event]
+        points = [(float(r[x]), float(r[y])) for r in rows if x in r and y in r]
+        if len(points) < 2:
+            events = list(dict.fromkeys(str(r["event"]) for r in self.rows))
+            unknown_name("row of event", event, events)
+        wanted = np.asarray(opening, dtype=np.float64)
+        out = np.full(wanted.shape, np.nan)
+        for (a, p), (b, q) in pairwise(points):
+            low, high = min(a, b), max(a, b)
+            small = 1e-9 * max(abs(a), abs(b))
+            inside = (wanted >= low - small) & (wanted <= high + small) & np.isnan(out)
+            part = (wanted - a) / (b - a) if b != a else np.ones(wanted.shape)
+            out = np.where(inside, p + np.clip(part, 0.0, 1.0) * (q - p), out)
+        if np.isnan(out).any():
+            lost = float(wanted[np.isnan(out)].ravel()[0])
+            reached = [a for a, _ in points]
+            raise InputError(
+                f"load_at: {x} = {lost:g} lies outside the rows of event '{event}', which reach "
+                f"from {min(reached):g} to {max(reached):g}"
+            )
+        return out
 
     def to_csv(self, path: str | Path) -> None:
         """Write all rows as comma-separated values; collective, rank 0 writes."""

@@ -26,7 +26,18 @@ from fxcrack.meshes.dcb import dcb_2d
 # --- N(a) -----------------------------------------------------------------------------------------
 
 
-def test_cycles_add_up_to_the_sum_of_the_law():
+def log_mean(a, b):
+    """Mean of what is log-linear between two values."""
+    return (a - b) / np.log(a / b)
+
+
+def elements(dG, law=PARIS, length=1.0):
+    """Cycles of each element whose ends have given ranges: dG is log-linear between them."""
+    slow = length / law.growth_rate(dG)
+    return log_mean(slow[1:], slow[:-1])
+
+
+def test_cycles_add_up_to_the_integral_of_the_law():
     scene = fatigue_specimen()
     history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=until_length(scene, 40.0)))
     rows = [r for r in history if r["event"] in GROWS]
@@ -35,8 +46,7 @@ def test_cycles_add_up_to_the_sum_of_the_law():
     dG, G_max = column(rows, "dG[bond]"), column(rows, "G_max[bond]")
     np.testing.assert_allclose(dG, (1.0 - 0.1**2) * G_max, rtol=1e-12)
     onset = PARIS.onset_cycles(dG[0])
-    expected = onset + np.concatenate([[0.0], np.cumsum(1.0 / PARIS.growth_rate(dG[:-1]))])
-    np.testing.assert_allclose(N[1:], expected[1:], rtol=1e-11)
+    np.testing.assert_allclose(N[1:], onset + np.cumsum(elements(dG)), rtol=1e-11)
     assert (N[0], history.rows[-1]["N"]) == (0.0, N[-1])
     np.testing.assert_allclose(column(rows, "dadN[bond]"), PARIS.growth_rate(dG), rtol=1e-12)
     # the same cycles, tip by tip
@@ -78,13 +88,14 @@ def test_n_of_a_is_the_integral_of_the_paris_law_over_the_static_rate():
 
 @pytest.mark.slow
 @pytest.mark.verification
-def test_vcct_sums_the_rate_at_the_beginning_of_each_element():
-    static = fatigue_dcb.static_rate(0.1, 8)
-    found = fatigue_dcb.run(0.1, 8, method="vcct")
-    dG = (1.0 - fatigue_dcb.RATIO**2) * static(found.a)
-    expected = static.onset() + np.cumsum(0.1 / fatigue_dcb.PARIS.growth_rate(dG))
-    # G by crack closure and by the stiffness differ by 2e-6 in the first element, N by 22e-6
-    np.testing.assert_allclose(found.N[1:], expected[:-1], rtol=5e-5)
+@pytest.mark.parametrize("method", ["vcct", "closure"])
+def test_half_a_millimetre_is_short_enough(method):
+    # the whole of N(a), onset included, on elements of 0.5 at an exponent of 10.6
+    static = fatigue_dcb.static_rate(0.5, 8)
+    found = fatigue_dcb.run(0.5, 8, method=method)
+    expected = static.onset() + static.cycles(found.a[1:])
+    # log-linear G and, with closure, its means over elements: (43 da/ae)^2/24 = 0.002 of each
+    np.testing.assert_allclose(found.N[1:], expected, rtol=0.01)
 
 
 def test_closed_form_is_that_of_the_reference():
@@ -139,10 +150,10 @@ def test_an_element_is_begun_anew_in_each_step_unless_growth_is_credited(credit)
     scene = fatigue_specimen(criterion=fatigue_law(credit=credit))
     history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.0, n_max=800.0))
     dG = history.rows[-1]["dG[bond]"]
-    onset, element = PARIS.onset_cycles(dG), 1.0 / PARIS.growth_rate(dG)
-    assert onset < 800.0 < onset + element
     history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.0, n_max=800.0))
     (first, *_) = [r for r in history if r["event"] == "release"]
+    onset, (element,) = PARIS.onset_cycles(dG), elements(np.array([dG, first["dG[bond]"]]))
+    assert onset < 800.0 < onset + element
     expected = (onset if credit else 800.0) + element
     assert first["N"] == pytest.approx(expected, rel=1e-9)
     assert np.any(scene.fatigue.credit[0]) == credit
@@ -162,7 +173,9 @@ def test_beyond_the_upper_limit_one_cycle_per_release():
     assert rows[len(fast)]["f[bond]"] < 0.9
     assert history.reason.startswith("arrest")
     assert history.rows[-2]["event"] == "arrest"
-    assert history.rows[-1]["G_max[bond]"] <= 0.2 * 0.4
+    # the crack stands where the next node would bring G below the threshold
+    last, before = (r["G_max[bond]"] for r in (history.rows[-1], rows[-2]))
+    assert 0.2 * 0.4 <= last and last**2 / before < 0.2 * 0.4
     scene.close()
 
 
@@ -233,6 +246,24 @@ def test_bodies_that_come_apart_end_the_step():
     assert np.isfinite(history.rows[-1]["N"]) and history.rows[-1]["a[bond]"] > 37.0
     assert largest_imbalance(history) < 1e-9
     scene.close()
+
+
+def test_growth_of_the_tips_is_ready_to_plot(tmp_path):
+    scene = fatigue_specimen()
+    history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=until_length(scene, 34.0)))
+    scene.close()
+    found = fx.plots.tip_growth(history, "bond")
+    rows = [r for r in history if r["event"] in GROWS]
+    np.testing.assert_allclose(found.a, [30.0, 31.0, 32.0, 33.0], rtol=1e-12)
+    np.testing.assert_allclose(found.N, column(rows, "N")[:-1], rtol=1e-12)
+    np.testing.assert_allclose(found.dadN, PARIS.growth_rate(found.dG), rtol=1e-12)
+    for show in ("rate", "length"):
+        fx.plots.paris(history, tmp_path / f"{show}.png", "bond", show=show)
+        assert (tmp_path / f"{show}.png").stat().st_size > 5000
+    with pytest.raises(fx.InputError, match="interface 'other' has no tips in the cycles"):
+        fx.plots.paris(history, tmp_path / "no.png", "other")
+    with pytest.raises(fx.InputError, match="choose 'rate' or 'length'"):
+        fx.plots.paris(history, tmp_path / "no.png", "bond", show="N")
 
 
 # --- messages -------------------------------------------------------------------------------------

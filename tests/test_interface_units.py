@@ -20,7 +20,8 @@ def front(nodes, area):
     none = np.zeros((n, 2, 2))
     return Tips(
         np.array(nodes), none[..., 0].astype(int), none.astype(int), none, np.zeros((n, 3, 3)),
-        zero, zero, zero, np.array(area, dtype=float), zero > 0.0,
+        zero, zero, zero, np.array(area, dtype=float),
+        none[:, 0].astype(int), none[:, 0], zero, zero == 0.0, zero > 0.0,
     )  # fmt: skip
 
 

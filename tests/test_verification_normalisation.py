@@ -15,7 +15,7 @@ from specimens import interface_of, specimen
 import fxcrack as fx
 from fxcrack.criteria import closure_rates, energy_release_rates
 from fxcrack.criteria.crack_closure import NORMALISATIONS
-from fxcrack.criteria.probe import bond_forces, closure_jumps, openings
+from fxcrack.criteria.probe import bond_forces, closure_jumps, further_openings, openings
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 
 pytestmark = pytest.mark.verification
@@ -41,11 +41,13 @@ def rates(x: Array) -> tuple[Array, dict[str, Array]]:
         lengths.append(length)
         force = bond_forces(growth.probe, tips, model.state)
         opening = openings(growth.probe, tips, model.state)
+        further = further_openings(growth.probe, tips, np.arange(len(tips)), model.state)
         scale = 1.0 / model.state.loads[1] ** 2
         for name in NORMALISATIONS:
             g = energy_release_rates(
-                force, opening, tips.d_ahead, tips.d_behind, tips.width, normalisation=name
-            )
+                force, opening, tips.d_ahead, tips.d_behind, tips.width, normalisation=name,
+                further=further, d_further=tips.d_further,
+            )  # fmt: skip
             found[name].append(scale * g[0, 0])
         jumps = closure_jumps(growth.probe, tips, force)
         found["closure"].append(scale * closure_rates(force, jumps, tips.area)[0, 0])
@@ -85,6 +87,8 @@ def test_uneven_spacing(fine: tuple[Array, Array], perturbed: str, seed: int) ->
         x = np.linspace(0.0, 100.0, n + 1)
         x[1:-1] += 0.4 * 100.0 / n * rng.uniform(-1.0, 1.0, n - 1)
     e = errors(x, fine)
+    assert e["equal_length"] < 0.02
+    assert 1.5 * e["equal_length"] < e["tributary"]
     assert e["tributary"] < (0.03 if perturbed == "steps" else 0.05)
     assert 1.5 * e["tributary"] < e["behind"]
     assert 1.5 * e["behind"] < e["ahead_sqrt"]

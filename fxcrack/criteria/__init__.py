@@ -11,7 +11,15 @@ from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.critical_stress import CriticalStress
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.evaluator import Evaluator, TipEvaluator
-from fxcrack.criteria.fatigue import CycleJump, Fatigue, Paris, Regime, cycle_jump
+from fxcrack.criteria.fatigue import (
+    CycleJump,
+    Fatigue,
+    Paris,
+    Rates,
+    Regime,
+    cycle_jump,
+    element_cycles,
+)
 from fxcrack.criteria.mixed_mode import BK, MixedMode, Power, Reeder, clip, total
 from fxcrack.criteria.release_laws import (
     AmplitudeRelease,
@@ -42,6 +50,7 @@ __all__ = [
     "Property",
     "RampRelease",
     "RateCriterion",
+    "Rates",
     "Reeder",
     "Regime",
     "ReleaseLaw",
@@ -51,6 +60,7 @@ __all__ = [
     "clip",
     "closure_rates",
     "cycle_jump",
+    "element_cycles",
     "energy_release_rates",
     "total",
 ]

@@ -16,9 +16,10 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.checks import one_of
 from fxcrack.base.errors import InputError
+from fxcrack.criteria.closure_lengths import length_of_force, opening_shares
 
 
 def opens(force: npt.ArrayLike, jump: npt.ArrayLike) -> npt.NDArray[np.bool_]:
@@ -91,11 +92,18 @@ def energy_release_rates(
     d_behind: npt.ArrayLike,
     width: npt.ArrayLike,
     *,
-    normalisation: Normalisation = "tributary",
+    normalisation: Normalisation = "equal_length",
+    further: npt.ArrayLike | None = None,
+    d_further: npt.ArrayLike = 0.0,
 ) -> Array:
     r"""Energy release rates by mode at front nodes, with their sign.
 
-    The length that turns F w/2 into a rate on an uneven mesh, "tributary": near the front the
+    What turns F w/2 into a rate on an uneven mesh, "equal_length": the force is that of even
+    spacing l, and the opening is taken at l behind the front, see
+    :mod:`fxcrack.criteria.closure_lengths`.
+
+    "tributary" leaves the opening where it is, at d_behind, and divides by a mean length: near the
+    front the
     traction varies as K/sqrt(r) and the opening as K sqrt(r). A nodal force that collects the
     traction of a length l is therefore proportional to K sqrt(l), an opening at distance l to K
     sqrt(l), and
@@ -129,7 +137,10 @@ def energy_release_rates(
             surface ends, for "tributary" and "behind".
         d_behind: Length of the element behind, shape (n,) or one number [length].
         width: Width of the front that belongs to the node, shape (n,) or one number [length].
-        normalisation: "tributary", "ahead", "ahead_sqrt" or "behind".
+        normalisation: "equal_length", "tributary", "ahead", "ahead_sqrt" or "behind".
+        further: Jumps at the second corner node behind, shape (n, 3) [length], for "equal_length";
+            None where it is not known: the singular field alone is then taken.
+        d_further: Distance of that node, shape (n,) or one number [length]; 0 where there is none.
 
     Returns:
         G_I, G_II, G_III, shape (n, 3) [force/length]. Closed wake nodes (w_n <= 0) do not count
@@ -151,11 +162,23 @@ def energy_release_rates(
         np.broadcast_to(np.asarray(v, dtype=np.float64), f.shape[:1])
         for v in (d_ahead, d_behind, width)
     )
-    return weighted_rates(f, w, closure_weights(ahead, behind, b, f.shape[1], normalisation))
+    weights = closure_weights(ahead, behind, b, f.shape[1], normalisation)
+    if normalisation == "equal_length":
+        none = further is None
+        far = np.zeros((len(f), 3)) if none else np.asarray(further, dtype=np.float64)
+        distance = np.zeros(len(f)) if none else np.broadcast_to(d_further, f.shape[:1])
+        shares = opening_shares(ahead, behind, np.asarray(distance, float), f.shape[1])
+        w = np.einsum("nkj,njc->nkc", shares, np.concatenate([w, far[:, None]], axis=1))
+    return weighted_rates(f, w, weights)
 
 
 def closure_weights(
-    ahead: Array, behind: Array, width: Array, n_products: int, normalisation: Normalisation
+    ahead: Array,
+    behind: Array,
+    width: Array,
+    n_products: int,
+    normalisation: Normalisation,
+    straight: Bools | None = None,
 ) -> Array:
     """What :func:`energy_release_rates` multiplies the products F w with.
 
@@ -165,6 +188,8 @@ def closure_weights(
         width: Width of the front that belongs to the node, shape (n,) [length].
         n_products: Products F w per node: 1, or 2 for second order.
         normalisation: As for :func:`energy_release_rates`.
+        straight: Whether both lengths lie on one line, shape (n,); where they do not,
+            "equal_length" is "tributary".
 
     Returns:
         Shape (n, n_products) [1/length^2].
@@ -173,13 +198,17 @@ def closure_weights(
         InputError: As there.
     """
     one_of(_OWNER, "normalisation", normalisation, NORMALISATIONS)
-    end_allowed = normalisation in ("tributary", "behind")
+    end_allowed = normalisation in ("equal_length", "tributary", "behind")
     _check_lengths(_OWNER, "d_ahead", ahead, zero=end_allowed)
     _check_lengths(_OWNER, "d_behind", behind, zero=False)
     _check_lengths(_OWNER, "width", width, zero=False)
-    if normalisation == "tributary":
+    if normalisation in ("equal_length", "tributary"):
         corner = np.sqrt((ahead + behind) / 2.0 * behind)
         midside = np.sqrt(ahead * behind)
+        if normalisation == "equal_length":
+            length = length_of_force(ahead, behind, n_products)
+            line = ahead > 0.0 if straight is None else straight & (ahead > 0.0)
+            corner, midside = np.where(line, length, corner), np.where(line, length, midside)
     else:
         corner = midside = {
             "ahead": ahead,
@@ -219,5 +248,5 @@ def _check_lengths(owner: str, name: str, values: Array, *, zero: bool) -> None:
         )
 
 
-Normalisation = Literal["tributary", "ahead", "ahead_sqrt", "behind"]
-NORMALISATIONS = ("tributary", "ahead", "ahead_sqrt", "behind")
+Normalisation = Literal["equal_length", "tributary", "ahead", "ahead_sqrt", "behind"]
+NORMALISATIONS = ("equal_length", "tributary", "ahead", "ahead_sqrt", "behind")

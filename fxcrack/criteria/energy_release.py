@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.checks import keep_floats, not_negative, one_of
+from fxcrack.base.checks import format_point, keep_floats, not_negative, one_of
 from fxcrack.base.errors import InputError
+from fxcrack.criteria.closure_lengths import LARGEST_RATIO, opening_shares, uneven
 from fxcrack.criteria.crack_closure import (
     NORMALISATIONS,
     Normalisation,
@@ -24,7 +25,14 @@ from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
 from fxcrack.criteria.mixed_mode import BK, MixedMode, law_of, total
-from fxcrack.criteria.probe import FrontProbe, State, bond_forces, closure_jumps, openings
+from fxcrack.criteria.probe import (
+    FrontProbe,
+    State,
+    bond_forces,
+    closure_jumps,
+    further_openings,
+    openings,
+)
 from fxcrack.criteria.release_laws import Driver, ReleaseLaw
 from fxcrack.criteria.toughness import Property, check_property, resolve
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
@@ -58,7 +66,7 @@ class RateCriterion(Criterion):
     mix: MixedMode | Callable[..., npt.ArrayLike] | None = field(default=None, kw_only=True)
     tolerance: float = field(default=0.2, kw_only=True)
     method: Method = field(default="vcct", kw_only=True)
-    normalisation: Normalisation = field(default="tributary", kw_only=True)
+    normalisation: Normalisation = field(default="equal_length", kw_only=True)
 
     knows_toughness: ClassVar[bool] = True
     release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "increments", "opening"))
@@ -248,6 +256,8 @@ class RateEvaluator(SofteningEvaluator):
         self._edges = edge_midsides(probe.front.surface) if softens else {}
         self._grouped: tuple[Tips, FrontUnits] | None = None
         self._weighed: Tips | None = None
+        self._shared: tuple[Tips, Array | None, Ints] | None = None
+        self._uneven_said = False
         self._weights = np.zeros((0, 1))
         surface = probe.pair.surface
         criterion.check_slaves(surface.n_nodes)
@@ -281,7 +291,7 @@ class RateEvaluator(SofteningEvaluator):
         if self.criterion.method == "closure":
             opening = closure_jumps(self.probe, tips, force)
         else:
-            opening = openings(self.probe, tips, state)
+            opening = self._openings(tips, state)
             if force.shape[1] == 2:
                 # on a ring the midside force belongs to its own circumference
                 breadth = self.probe.front.surface.breadth
@@ -290,6 +300,66 @@ class RateEvaluator(SofteningEvaluator):
         if self._moving and self._temperature is not None:
             columns.append(self._temperature(time)[tips.node, None])
         return np.concatenate(columns, 1)
+
+    def _openings(self, tips: Tips, state: State) -> Array:
+        """Openings that the forces at tips are multiplied with, shape (n, k, 3), length."""
+        opening = openings(self.probe, tips, state)
+        if self.criterion.normalisation != "equal_length":
+            return opening
+        shares, rows = self._shares_of(tips)
+        if shares is None:
+            return opening
+        far = np.zeros((len(tips), 1, 3))
+        far[rows, 0] = further_openings(self.probe, tips, rows, state)
+        return np.asarray(np.einsum("nkj,njc->nkc", shares, np.concatenate([opening, far], axis=1)))
+
+    def _shares_of(self, tips: Tips) -> tuple[Array | None, Ints]:
+        """Shares of the measured openings, None where spacing is even; tips that need the further.
+
+        The second has shape (m,).
+        """
+        if self._shared is None or self._shared[0] is not tips:
+            behind, none = tips.d_behind, np.zeros(0, dtype=np.int64)
+            # an opening that does not lie behind the force on one line stays where it is
+            ahead = np.where(tips.straight, tips.d_ahead, behind)
+            if not uneven(ahead, behind).any():
+                self._shared = tips, None, none
+            else:
+                self._look_at_lengths(tips)
+                shares = opening_shares(ahead, behind, tips.d_further, tips.force_nodes.shape[1])
+                rows = np.flatnonzero(np.any(shares[:, :, -1] != 0.0, axis=1))
+                self._shared = tips, shares, rows
+        return self._shared[1:]
+
+    def _look_at_lengths(self, tips: Tips) -> None:
+        """Warn once where lengths behind and ahead differ by more than is calibrated."""
+        on = (tips.d_ahead > 0.0) & tips.straight
+        ratio = np.divide(tips.d_ahead, tips.d_behind, out=np.ones(len(tips)), where=on)
+        far = np.maximum(ratio, 1.0 / ratio)
+        i = int(np.argmax(far))
+        if self._uneven_said or far[i] <= LARGEST_RATIO * (1.0 + 1e-6):
+            return
+        self._uneven_said = True
+        log.warn(
+            "interface '%s': at the tip at %s the elements are %.4g long behind it and %.4g "
+            "ahead, a ratio of %.3g; virtual crack closure is calibrated for ratios up to %g, and "
+            "G may be off by more than 5 %% there: grade the mesh in several steps, or take "
+            "method='closure'",
+            self.probe.pair.title,
+            format_point(self.probe.pair.surface.x[tips.node[i]]),
+            tips.d_behind[i],
+            tips.d_ahead[i],
+            far[i],
+            LARGEST_RATIO,
+        )
+
+    def needs(self, tips: Tips) -> Ints:
+        """On uneven spacing the second corner node behind each tip, shape (m,)."""
+        criterion = self.criterion
+        if criterion.method != "vcct" or criterion.normalisation != "equal_length":
+            return np.zeros(0, dtype=np.int64)
+        _, rows = self._shares_of(tips)
+        return np.unique(tips.further_nodes[rows])
 
     def rates(self, tips: Tips, measured: Array) -> Array:
         """Energy release rates by mode, shape (n, 3), force/length.
@@ -307,7 +377,9 @@ class RateEvaluator(SofteningEvaluator):
             return closure_rates(force, opening, tips.area)
         if tips is not self._weighed:
             lengths = (tips.d_ahead, tips.d_behind, tips.width)
-            self._weights = closure_weights(*lengths, force.shape[1], self.criterion.normalisation)
+            self._weights = closure_weights(
+                *lengths, force.shape[1], self.criterion.normalisation, tips.straight
+            )
             self._weighed = tips
         return weighted_rates(force, opening, self._weights)
 
@@ -358,7 +430,8 @@ class RateEvaluator(SofteningEvaluator):
         """Nodes that soften by one law each, and the energy it dissipates until they are free.
 
         All nodes of a unit share a law: their forces, pressed ones included, fall in proportion,
-        and together they dissipate the energy per area of the law times the area of the unit.
+        and together they dissipate the energy per area of the law times the area the front sweeps
+        when the unit is released.
 
         Args:
             nodes: All nodes that are released now, shape (n,).
@@ -368,7 +441,7 @@ class RateEvaluator(SofteningEvaluator):
         Raises:
             NotPositiveDefinite: A body would come free: its last unit frees unbounded energy.
         """
-        surface = self.probe.front.surface
+        front = self.probe.front
         tips, units = values.tips, self.units(values.tips)
         rates = np.stack([values.report[k] for k in ("GI", "GII", "GIII")], axis=1)
         toughness = self._toughness(tips, values.measured)
@@ -376,7 +449,7 @@ class RateEvaluator(SofteningEvaluator):
             self.probe.pair.surface.x[tips.node, : self.probe.gdim],
             tips.node,
             self._tip_temperature(tips, values.measured),
-            n_slave=surface.n_nodes,
+            n_slave=front.surface.n_nodes,
         )
         if propagation is not None:
             toughness = propagation
@@ -399,7 +472,7 @@ class RateEvaluator(SofteningEvaluator):
                 continue
             unit = np.intersect1d(tips.force_nodes[rows], left)
             left = np.setdiff1d(left, unit)
-            energy = float(critical[k] * surface.areas[unit].sum())
+            energy = float(critical[k] * front.swept(int(tips.node[first]), unit))
             out.append(CohesiveUnit(unit, energy, bool(rates[k, 0] <= 0.0)))
         return out
 

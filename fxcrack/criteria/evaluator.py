@@ -130,9 +130,12 @@ def repeat_tips(tips: Tips, times: int) -> Tips:
 
 def first_tips(tips: Tips, n: int) -> Tips:
     """The first tips alone."""
-    if n == len(tips):
-        return tips
-    return Tips(**{name: getattr(tips, name)[:n] for name in Tips.__dataclass_fields__})
+    return tips if n == len(tips) else at_rows(tips, np.arange(n))
+
+
+def at_rows(tips: Tips, rows: Ints) -> Tips:
+    """Some of the tips, those at positions of shape (m,)."""
+    return Tips(**{name: getattr(tips, name)[rows] for name in Tips.__dataclass_fields__})
 
 
 def first_crossing(

@@ -7,10 +7,13 @@ With the total rate G at the extremes of a cycle, dG = G_max - G_min, and G_c of
              none                       G_max <= r1 G_c
              the element in one cycle   G_max >= r2 G_c
 
-Between releases dG stays as it is, so the number of cycles to the next release is a closed form and
-one stabilised cycle is solved per release. At constant amplitude
+One stabilised cycle is solved per release, at the beginning of each element. It is at the same time
+the end of the element before, and in between log dG and log G_max are linear in a: the cycles of an
+element are the integral
 
-    N(a) = N0 + sum_i da_i/(c3 dG(a_i)^c4)
+    dN = int da/(c3 dG(a)^c4)
+
+At constant amplitude N(a) is so the integral of the Paris law over G(a).
 """
 
 from __future__ import annotations
@@ -175,6 +178,7 @@ def cycle_jump(
     credit: npt.ArrayLike | None = None,
     tolerance: float = 0.2,
     limit: float = np.inf,
+    short: bool = False,
 ) -> CycleJump:
     """Jump over the cycles to the next release.
 
@@ -199,6 +203,7 @@ def cycle_jump(
             of nodes that are not released is not kept.
         tolerance: f_tol; nodes with dN <= (1 + f_tol) of the smallest are released together.
         limit: Cycles at which the analysis ends.
+        short: Whether the limit is known to come before the next release.
 
     Returns:
         The jump.
@@ -226,7 +231,7 @@ def cycle_jump(
         release = np.isfinite(dN) & (dN <= (1.0 + tolerance) * jump)
         if not release.any():
             event, jump = "arrest", 0.0
-    if cycles + jump > limit:
+    if cycles + jump > limit or short:
         event, jump, release = "limit", max(limit - cycles, 0.0), np.zeros(n, dtype=np.bool_)
 
     if credit is not None:
@@ -242,6 +247,104 @@ def cycle_jump(
         initiated=onset_over,
         credit=None if credit is None else grown,
     )
+
+
+@dataclass(frozen=True)
+class Rates:
+    """What one stabilised cycle says of some front nodes.
+
+    Attributes:
+        dG: Range of the total rate, shape (n,), force/length.
+        G_max: Its largest value, likewise.
+        G_c: Critical total rate at the mode mix of G_max, likewise.
+    """
+
+    dG: Array
+    G_max: Array
+    G_c: Array
+
+    def at(self, other: Rates, x: npt.ArrayLike) -> Rates:
+        """Values on the way to others, log-linear.
+
+        Args:
+            other: Values at x = 1.
+            x: Part of the way, shape (n,) or (m, n); may lie outside 0 to 1.
+        """
+        pairs = ((getattr(self, k), getattr(other, k)) for k in ("dG", "G_max", "G_c"))
+        return Rates(*(_log_linear(a, b, np.asarray(x, dtype=np.float64)) for a, b in pairs))
+
+
+def element_cycles(
+    paris: Paris,
+    begin: Rates,
+    end: Rates,
+    da: npt.ArrayLike,
+    grown: npt.ArrayLike = 0.0,
+) -> Array:
+    """Cycles in which a front passes an element: the integral of da/(da/dN).
+
+    Rates are log-linear between both ends of the element. Between points the growth rate is, too,
+    so a power law is integrated exactly. What lies beyond the upper limit takes no cycles.
+
+    Args:
+        paris: Constants of growth.
+        begin: Values at the beginning of each element, n of them.
+        end: Values at its end.
+        da: Length of each element, shape (n,) or one number [length].
+        grown: Length of it that is passed already, likewise.
+
+    Returns:
+        Shape (n,); inf where the front comes to the threshold within the element.
+    """
+    n = len(begin.dG)
+    da = np.broadcast_to(np.asarray(da, dtype=np.float64), (n,))
+    first = np.clip(np.broadcast_to(np.asarray(grown, dtype=np.float64), (n,)) / da, 0.0, 1.0)
+    out = np.zeros(n)
+    for i in range(n):
+        here = Rates(*(getattr(begin, k)[i : i + 1] for k in ("dG", "G_max", "G_c")))
+        there = Rates(*(getattr(end, k)[i : i + 1] for k in ("dG", "G_max", "G_c")))
+        x = np.linspace(first[i], 1.0, _POINTS)
+        x = np.unique(np.append(x, [c for c in _limits(paris, here, there) if first[i] < c < 1.0]))
+        middle = here.at(there, 0.5 * (x[1:] + x[:-1])[:, None])
+        regime = paris.regime(middle.G_max, middle.G_c)[:, 0]
+        if np.any(regime == Regime.NONE):
+            out[i] = np.inf
+            continue
+        with np.errstate(divide="ignore"):
+            slow = -np.log(paris.growth_rate(here.at(there, x[:, None]).dG[:, 0]))
+        for k in np.flatnonzero(regime == Regime.PARIS):
+            out[i] += da[i] * (x[k + 1] - x[k]) * _mean_of_exponential(slow[k], slow[k + 1])
+    return out
+
+
+_POINTS = 17
+"""Points at which the growth rate is taken within an element."""
+
+
+def _limits(paris: Paris, here: Rates, there: Rates) -> list[float]:
+    """Parts of an element at which G_max/G_c passes the threshold or the upper limit."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        a, b = (float(np.log(r.G_max[0] / r.G_c[0])) for r in (here, there))
+        found = [(np.log(limit) - a) / (b - a) for limit in (paris.r1, paris.r2) if limit > 0.0]
+    return [float(x) for x in found if np.isfinite(x)]
+
+
+def _mean_of_exponential(a: float, b: float) -> float:
+    """Mean of exp over the straight way from a to b."""
+    if not (np.isfinite(a) and np.isfinite(b)):
+        return float("inf")
+    difference = b - a
+    if abs(difference) < 1e-9:
+        return float(np.exp(0.5 * (a + b)))
+    return float(np.exp(a) * np.expm1(difference) / difference)
+
+
+def _log_linear(a: Array, b: Array, x: Array) -> Array:
+    """a^(1 - x) b^x; where one of them is zero, linear and not negative."""
+    good = (a > 0.0) & (b > 0.0)
+    one, two = np.where(good, a, 1.0), np.where(good, b, 1.0)
+    straight = np.maximum((1.0 - x) * a + x * b, 0.0)
+    return np.where(good, np.exp((1.0 - x) * np.log(one) + x * np.log(two)), straight)
 
 
 def _front_arrays(*given: npt.ArrayLike) -> list[Array]:

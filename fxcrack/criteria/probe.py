@@ -165,6 +165,23 @@ def openings(probe: FrontProbe, tips: Tips, state: State) -> Array:
     return np.asarray(np.einsum("nci,nkc->nki", tips.frame, jump))
 
 
+def further_openings(probe: FrontProbe, tips: Tips, rows: Ints, state: State) -> Array:
+    """Openings at the second corner points behind some tips, in the tip frames.
+
+    Args:
+        probe: The interface.
+        tips: Front nodes.
+        rows: Which of them, shape (m,).
+        state: State of the solver.
+
+    Returns:
+        Components (opening, slip, tear), shape (m, 3) [length].
+    """
+    jump = probe.jumps(tips.further_nodes[rows], state)
+    jump = np.einsum("nm,nmc->nc", tips.further_weights[rows], jump)
+    return np.asarray(np.einsum("nci,nc->ni", tips.frame[rows], jump))
+
+
 def closure_jumps(probe: FrontProbe, tips: Tips, force: Array) -> Array:
     """Jumps that releasing the force nodes of each tip alone would open, in the tip frames.
 

@@ -2,7 +2,8 @@
 
 2-D: the length of the open run that ends at a tip, measured along the slave surface from the end
 of the surface; half of it when both its ends are tips, or were until one of them reached the end of
-the surface. Once nothing is bonded, the open length of each initial tip.
+the surface. Lines that close on themselves have no end, and a run there has two tips. Once nothing
+is bonded, the open length of each initial tip.
 3-D: open area divided by the length of the initial front; the facets cut by the front count half.
 """
 
@@ -29,13 +30,10 @@ class CrackExtent:
         tips = front.tips()
         self._front_length = float(tips.width.sum()) if len(tips) else 0.0
         self._known: tuple[int, list[tuple[int, float]]] = (-1, [])
+        self._was_bonded = front.bonded.copy()
         if self._line:
             self._paths = [_along(path, surface.x) for path in _polylines(surface.facets[:, :2])]
-            bonded = front.bonded
-            self._initially = [
-                (bool(bonded[nodes[0]]), bool(bonded[nodes[-1]]), _changes(bonded[nodes]))
-                for nodes, _ in self._paths
-            ]
+            self._n_tips = [_changes(self._was_bonded[nodes]) for nodes, _ in self._paths]
 
     def area(self, tips: Tips) -> float:
         """Open area (length times thickness or ring in 2-D), length^2."""
@@ -64,19 +62,29 @@ class CrackExtent:
 
     def _measure(self) -> list[tuple[int, float]]:
         out: list[tuple[int, float]] = []
-        for (nodes, s), (from_first, from_last, n_tips) in zip(
-            self._paths, self._initially, strict=True
-        ):
+        for (nodes, s), n_tips in zip(self._paths, self._n_tips, strict=True):
             bonded = self._front.bonded[nodes]
+            closed = nodes[0] == nodes[-1]
+            if closed and bonded.any():
+                # a closed line is walked from a bonded node on, so that no run is cut in two
+                begin = int(np.argmax(bonded))
+                steps = np.roll(np.diff(s), -begin)
+                nodes = np.append(np.roll(nodes[:-1], -begin), nodes[begin])
+                s, bonded = np.concatenate([[0.0], np.cumsum(steps)]), self._front.bonded[nodes]
             # runs of open nodes; each reaches to the bonded nodes on both sides
             edge = np.flatnonzero(np.diff(np.concatenate([[True], bonded, [True]]).astype(int)))
             for first, stop in edge.reshape(-1, 2):
                 left, right = max(first - 1, 0), min(stop, len(nodes) - 1)
-                tips = [int(nodes[k]) for k in {left, right} if bonded[k]]
                 total = float(s[right] - s[left])
+                ends = nodes[[left, right]]
                 # tips that have reached an end of the surface still share the length
-                share = int(bonded[left] or from_first) + int(bonded[right] or from_last)
+                share = (
+                    2
+                    if closed
+                    else sum(int(bonded[k] or self._was_bonded[nodes[k]]) for k in (left, right))
+                )
                 share = share or max(n_tips, 1)
+                tips = {int(k) for k in ends if self._front.bonded[k]}
                 out += [(tip, total / share) for tip in sorted(tips)] or [(-1, total / share)]
         return out
 
@@ -87,7 +95,10 @@ def _changes(bonded: Bools) -> int:
 
 
 def _polylines(ends: Ints) -> list[Ints]:
-    """Corner nodes of a line of facets in order, one array per connected piece."""
+    """Corner nodes of a line of facets in order, one array per connected piece.
+
+    A closed line ends with the node it begins with.
+    """
     around: dict[int, list[int]] = {}
     for a, b in ends.tolist():
         around.setdefault(a, []).append(b)
@@ -106,6 +117,8 @@ def _polylines(ends: Ints) -> list[Ints]:
             here = nxt[0]
             path.append(here)
             left.discard(here)
+        if len(path) > 2 and start in around[here]:
+            path.append(start)
         out.append(np.array(path))
     return out
 

@@ -8,12 +8,13 @@ interpolated there. Second-order surfaces use the corner-midside-corner lines of
 
 The last bonded node between two open parts is a tip of both (:attr:`Tips.ligament`): it takes the
 means of what lies on either side, so that neither the numbering of the nodes nor the orientation of
-the line has a say. Where places are equal otherwise, :func:`_first_by_place` decides.
+the line has a say. Where places are equal otherwise, :func:`first_by_place` decides.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
@@ -21,7 +22,8 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InterfaceError
 from fxcrack.interface.surface import FacetSurface
-from fxcrack.interface.tips import Tip, Tips, cross, gradient, norm
+from fxcrack.interface.swept_area import SweptArea, facet_parts, nearest_heading, swept
+from fxcrack.interface.tips import Tip, Tips, cross, first_by_place, gradient, norm
 
 _EDGES = {
     "interval": ((0, 1),),
@@ -33,24 +35,6 @@ _LINES = {
     "interval": ((0, 2, 1),),
     "quadrilateral": ((0, 4, 1), (2, 7, 3), (0, 5, 2), (1, 6, 3), (5, 8, 6), (4, 8, 7)),
 }
-
-
-_SAME = 1e-9
-"""Lengths and cosines that differ by less than this fraction are equal."""
-_PLACES = np.array([0.8147, 0.4351, 0.3836])
-"""Direction along which equal places are ordered: across no symmetry that meshes usually have."""
-
-
-def _first_by_place(values: Array, x: Array) -> int:
-    """Position of the largest of some values; of equal ones the first along a fixed direction.
-
-    Args:
-        values: Shape (n,), of the size of lengths in ``x`` or of 1.
-        x: Places they belong to, shape (n, 3); unlike numbers of nodes, these are the mesh's own.
-    """
-    top = float(values.max())
-    equal = np.flatnonzero(values >= top - _SAME * max(abs(top), float(np.abs(values).max())))
-    return int(equal[np.argmin(x[equal] @ _PLACES)]) if len(equal) > 1 else int(equal[0])
 
 
 class Front:
@@ -105,7 +89,7 @@ class Front:
         self._is_middle = np.zeros(surface.n_nodes, dtype=bool)
         if surface.order == 2:
             self._check_middles(facets)
-        self._heading = self._initial_heading() if self._by_lines else None
+        self._was_bonded = self.bonded.copy()
 
     @property
     def _by_lines(self) -> bool:
@@ -137,32 +121,68 @@ class Front:
             loose = self.bonded[facets[:, 2]] & (ends < 2)
             self.bonded[facets[loose, 2]] = False
 
-    def _initial_heading(self) -> Array:
-        """Growth direction per node, shape (n_nodes, 3).
+    @cached_property
+    def _headings(self) -> Array:
+        """Growth direction per node, that of the initial front nearest to it, shape (n_nodes, 3).
 
-        That of the initial front nearest to it, averaged over a few of its facets: one facet alone
-        may lie on the side of a step of the front.
+        Zero where the surface has no front.
         """
-        s = self.surface
-        indicator = (~self.bonded).astype(float)
+        s = self._undeformed
+        indicator = (~self._was_bonded).astype(float)
         corner = s.facets[:, : s.n_corners]
         mixed = (indicator[corner].sum(axis=1) > 0) & (indicator[corner].sum(axis=1) < s.n_corners)
         if not mixed.any():
             return np.zeros((s.n_nodes, 3))
         direction = np.array([-gradient(s, int(f), indicator)[0] for f in np.flatnonzero(mixed)])
         direction /= np.maximum(np.linalg.norm(direction, axis=1, keepdims=True), 1e-300)
-        centre = s.x[corner[mixed]].mean(axis=1)
-        distance = np.linalg.norm(s.x[:, None] - centre[None], axis=2)
-        beyond = (distance - distance.min(axis=1, keepdims=True)) / (2.0 * s.facet_size)
-        weight = np.exp(-(beyond**2))
-        mean = weight @ direction
-        length = np.linalg.norm(mean, axis=1, keepdims=True)
-        # opposite fronts at one distance: no mean, one of them
-        lost = length < 0.5 * weight.sum(axis=1, keepdims=True)
-        nearest = direction[np.argmin(distance, axis=1)]
-        for i in np.flatnonzero(lost[:, 0]):
-            nearest[i] = direction[_first_by_place(-distance[i], centre)]
-        return np.where(lost, nearest, mean / np.maximum(length, 1e-300))
+        return nearest_heading(s, s.x[corner[mixed]].mean(axis=1), direction)
+
+    def swept(self, node: int, nodes: Ints) -> float:
+        """Area that the front sweeps when a front node is released, length^2.
+
+        The last nodes of the surface, with nothing ahead of them, and those between two open parts
+        count with the area they stand for. See :mod:`fxcrack.interface.swept_area`.
+
+        Args:
+            node: The front node.
+            nodes: Itself and what is released with it: midside nodes, the other nodes of an
+                element edge; shape (n,).
+        """
+        s = self._undeformed
+        tip = self.tip(node)
+        if tip.d_ahead <= 0.0 or tip.ligament:
+            return float(s.areas[nodes].sum())
+        if s.dim == 1:
+            return self._swept_on_line(node, int(tip.wake_nodes[0, 0]))
+        heading = self._headings[node]
+        growth = heading if self._by_lines else self._growth(node, s)
+        if growth is None:
+            return float(s.areas[nodes].sum())
+        area = sum(self._sweep.of_node(int(k), growth) for k in nodes)
+        return area if area > 0.0 else float(s.areas[nodes].sum())
+
+    def _swept_on_line(self, node: int, behind: int) -> float:
+        """Area swept over a corner node of a line, the open corner behind it given."""
+        facets = self._undeformed.facets
+        areas = self._facet_areas
+        around = [int(f) for f in self._facets_of[node]]
+        ahead = next(f for f in around if behind not in facets[f])
+        back = next(f for f in around if behind in facets[f])
+        end = next(int(k) for k in facets[ahead, :2] if k != node)
+        beyond = next((int(f) for f in self._facets_of[end] if f != ahead), ahead)
+        grown = bool(self._was_bonded[behind])
+        return swept(
+            areas[ahead], areas[back if grown else ahead], areas[beyond], self._undeformed.order
+        )
+
+    @cached_property
+    def _facet_areas(self) -> Array:
+        """Areas of the facets of the undeformed surface, shape (n_facets,), length^2."""
+        return facet_parts(self._undeformed).sum(axis=1)
+
+    @cached_property
+    def _sweep(self) -> SweptArea:
+        return SweptArea(self._undeformed, self._headings, self._was_bonded)
 
     def follow(self, x: Array) -> None:
         """Take the slave nodes at other positions: the current configuration.
@@ -219,10 +239,10 @@ class Front:
         if self._by_lines:
             middle = middles[bonded]
             is_open &= ~self.bonded[middle]
-            if self.surface.dim == 2 and self._heading is not None:
+            if self.surface.dim == 2:
                 back = self.surface.x[bonded][:, None] - self.surface.x[far]
                 length = np.linalg.norm(back, axis=2)
-                along = np.einsum("nkc,nc->nk", back, self._heading[bonded])
+                along = np.einsum("nkc,nc->nk", back, self._headings[bonded])
                 is_open &= along > 0.7 * length
         return bonded[is_open.any(axis=1)]
 
@@ -242,7 +262,7 @@ class Front:
             e, z = np.zeros(0, dtype=np.int64), np.zeros(0)
             return Tips(e, e.reshape(0, k), np.zeros((0, k, 2), dtype=np.int64),
                         np.zeros((0, k, 2)), np.zeros((0, 3, 3)), z, z, z, z,
-                        np.zeros(0, dtype=bool))  # fmt: skip
+                        e.reshape(0, 2), np.zeros((0, 2)), z, z > 0.0, z > 0.0)  # fmt: skip
         return Tips(
             np.array([t.node for t in found]),
             np.array([t.force_nodes for t in found]),
@@ -253,7 +273,11 @@ class Front:
             np.array([t.d_behind for t in found]),
             np.array([t.width for t in found]),
             np.array([t.area for t in found]),
-            np.array([t.ligament for t in found]),
+            np.array([t.further_nodes for t in found]),
+            np.array([t.further_weights for t in found]),
+            np.array([t.d_further for t in found]),
+            np.array([t.straight for t in found], dtype=bool),
+            np.array([t.ligament for t in found], dtype=bool),
         )
 
     def tip(self, node: int) -> Tip:
@@ -303,14 +327,14 @@ class Front:
         # the undeformed surface chooses, so that bodies that move do not change it
         reference = self._undeformed.x
         length = np.linalg.norm(reference[ends] - reference[node], axis=1)
-        near = _first_by_place(-length, reference[ends])
+        near = first_by_place(-length, reference[ends])
         normal = s.normals[node]
         growth = s.x[node] - s.x[ends[near]]
         growth = growth - (growth @ normal) * normal
         growth = growth / norm(growth)
         back = reference[node] - reference[ends[near]]
         cosine = (reference[ends] - reference[node]) @ back / (length * length[near])
-        far = _first_by_place(cosine, reference[ends])
+        far = first_by_place(cosine, reference[ends])
         both = np.array([near, far if cosine[far] >= 0.3 else near])
         return np.asarray(growth), both, float(length[both].mean())
 
@@ -323,15 +347,16 @@ class Front:
         width = float(s.breadth[node]) if s.dim == 1 else area / mean
         return Tip(
             node, np.array([node]), ends[both][None], np.array([[0.5, 0.5]]),
-            self._frame(node, growth, s), mean, mean, width, area, True,
+            self._frame(node, growth, s), mean, mean, width, area,
+            ends[both], np.array([0.5, 0.5]), 0.0, False, True,
         )  # fmt: skip
 
     def _tip(self, node: int, s: FacetSurface) -> Tip:
         growth = self._growth(node, s)
         if growth is None:
             return self._ligament(node, s)
-        d_behind, wake, weights = self._ray(node, -growth, s, open_side=True)
-        d_ahead, ahead, _ = self._ray(node, growth, s, open_side=False)
+        d_behind, wake, weights, met = self._ray(node, -growth, s, open_side=True)
+        d_ahead, ahead, _, met_ahead = self._ray(node, growth, s, open_side=False)
         if s.dim == 1:
             width = float(s.breadth[node])
             across = 0.5 * (width + float(s.breadth[ahead[0]]))
@@ -341,12 +366,54 @@ class Front:
         return Tip(
             node, np.array([node]), wake[None], weights[None], self._frame(node, growth, s),
             d_ahead, d_behind, width, area,
+            *self._further(node, wake, weights, d_behind, -growth, s), met and met_ahead,
         )  # fmt: skip
+
+    def _further(
+        self, node: int, wake: Ints, weights: Array, d_behind: float, back: Array, s: FacetSurface
+    ) -> tuple[Ints, Array, float]:
+        """The next point behind the wake point: two nodes, their weights, distance from the tip.
+
+        On a line the next node; on a surface where the ray leaves the facets behind the wake
+        point. The distance is 0 where there is none or a part of it is bonded.
+        """
+        none = wake, weights, 0.0
+        if s.dim == 1:
+            corner = int(wake[0])
+            ends = [int(k) for k in self.neighbours(corner) if int(k) != node]
+            if not ends or self.bonded[ends[0]]:
+                return none
+            step = norm(s.x[ends[0]] - s.x[corner])
+            return np.array([ends[0], ends[0]]), np.array([1.0, 0.0]), d_behind + step
+        held = wake[weights > 0.0].tolist()
+        facets = set(self._facets_of[held[0]].tolist())
+        for k in held[1:]:
+            facets &= set(self._facets_of[k].tolist())
+        side, origin = cross(s.normals[node], back), s.x[node]
+        best: tuple[float, Ints, Array] | None = None
+        for facet in sorted(facets - set(self._facets_of[node].tolist())):
+            corner_nodes = s.facets[facet, : s.n_corners]
+            for a, b in _EDGES[s.kind]:
+                i, j = int(corner_nodes[a]), int(corner_nodes[b])
+                if i in held and j in held:
+                    continue
+                at = _crossing(s.x[i] - origin, s.x[j] - origin, back, side)
+                if at is None or at[0] < d_behind * (1.0 + 1e-6):
+                    continue
+                if best is None or at[0] < best[0] * (1.0 - 1e-9):
+                    best = at[0], np.array([i, j]), np.array([1.0 - at[1], at[1]])
+        if best is None or self.bonded[best[1][best[2] > 0.0]].any():
+            return none
+        return best[1], best[2], best[0]
 
     def _ray(
         self, node: int, direction: Array, s: FacetSurface, *, open_side: bool
-    ) -> tuple[float, Ints, Array]:
-        """Where a ray leaves the facets around a node: distance, two nodes, their weights."""
+    ) -> tuple[float, Ints, Array, bool]:
+        """Where a ray leaves the facets around a node: distance, two nodes, their weights.
+
+        The last value says whether it does so at all: at an edge the ray may leave the surface at
+        once, and the best aligned neighbour stands for it.
+        """
         origin = s.x[node]
         best: tuple[float, Ints, Array] | None = None
         if s.dim == 2:
@@ -357,34 +424,30 @@ class Front:
                     i, j = corner[a], corner[b]
                     if node in (i, j):
                         continue
-                    pi, pj = s.x[i] - origin, s.x[j] - origin
-                    ci, cj = float(pi @ side), float(pj @ side)
-                    if abs(ci - cj) < 1e-300:
+                    found = _crossing(s.x[i] - origin, s.x[j] - origin, direction, side)
+                    if found is None:
                         continue
-                    w = ci / (ci - cj)
-                    if not -1e-6 <= w <= 1.0 + 1e-6:
-                        continue
-                    w = 0.0 if abs(w) < 1e-6 else 1.0 if abs(w - 1.0) < 1e-6 else w
-                    distance = float(((1.0 - w) * pi + w * pj) @ direction)
+                    distance, w = found
                     if distance > 0.0 and (best is None or distance < best[0] * (1.0 - 1e-9)):
                         best = distance, np.array([i, j]), np.array([1.0 - w, w])
             if best is not None:
-                return best
+                return *best, True
         # along a line, or where the ray leaves the surface at once: the best aligned neighbour
         near = [k for k in self.neighbours(node) if not open_side or not self.bonded[k]]
         vectors = s.x[near] - origin if near else np.zeros((0, 3))
         length = np.linalg.norm(vectors, axis=1)
         cosine = vectors @ direction / np.where(length > 0.0, length, 1.0)
+        on_line = s.dim == 1
         if not near or cosine.max() < 0.3:
             if open_side:
-                k = _first_by_place(-length, s.x[near])
-                return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
-            return 0.0, np.array([node, node]), np.array([1.0, 0.0])
-        k = _first_by_place(cosine, s.x[near])
-        return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0])
+                k = first_by_place(-length, s.x[near])
+                return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0]), on_line
+            return 0.0, np.array([node, node]), np.array([1.0, 0.0]), on_line
+        k = first_by_place(cosine, s.x[near])
+        return float(length[k]), np.array([near[k], near[k]]), np.array([1.0, 0.0]), on_line
 
     def _tip_on_lines(self, node: int, s: FacetSurface) -> Tip:
-        heading = self._heading[node] if self._heading is not None else np.zeros(3)
+        heading = self._headings[node]
         links = self.links[node]
         vectors = s.x[links[:, 0]] - s.x[node]
         length = np.linalg.norm(vectors, axis=1)
@@ -395,13 +458,13 @@ class Front:
             behind = int(np.argmax(is_open))
         else:
             along = np.where(is_open, -(vectors @ heading) / length, -2.0)
-            behind = _first_by_place(along, s.x[links[:, 0]])
+            behind = first_by_place(along, s.x[links[:, 0]])
         growth = -vectors[behind] / length[behind]
         normal = s.normals[node]
         growth = growth - (growth @ normal) * normal
         growth /= np.linalg.norm(growth)
         cosine = vectors @ growth / length
-        ahead = _first_by_place(cosine, s.x[links[:, 0]])
+        ahead = first_by_place(cosine, s.x[links[:, 0]])
         corner, middle = links[behind]
         if cosine[ahead] < 0.3 or ahead == behind or not self.bonded[links[ahead, 1]]:
             # the surface ends, or the tip on the other side has released the midside node
@@ -419,6 +482,7 @@ class Front:
             node, force_nodes, np.array([[corner, corner], [middle, middle]]),
             np.array([[1.0, 0.0], [1.0, 0.0]]), self._frame(node, growth, s), d_ahead, d_behind,
             width, across * d_ahead if d_ahead > 0.0 else 0.5 * width * d_behind,
+            *self._further_corner(int(corner), d_behind, -growth, s), True,
         )  # fmt: skip
 
     def _ligament_on_line(self, node: int, s: FacetSurface, links: Ints) -> Tip:
@@ -434,8 +498,42 @@ class Front:
         # both tips have released their midside nodes: half of an element is left, of their mean
         return Tip(
             node, np.array([node, node]), links[both].T, np.full((2, 2), 0.5),
-            self._frame(node, growth, s), 0.0, mean, width, 0.5 * width * mean, True,
+            self._frame(node, growth, s), 0.0, mean, width, 0.5 * width * mean,
+            links[both, 0], np.array([0.5, 0.5]), 0.0, False, True,
         )  # fmt: skip
+
+    def _further_corner(
+        self, corner: int, d_behind: float, back: Array, s: FacetSurface
+    ) -> tuple[Ints, Array, float]:
+        """The corner node behind a wake corner, as :meth:`_further` gives it."""
+        links = self.links[corner]
+        vectors = s.x[links[:, 0]] - s.x[corner]
+        length = np.linalg.norm(vectors, axis=1)
+        best = int(np.argmax(vectors @ back / length))
+        far = int(links[best, 0])
+        same = np.array([corner, corner]), np.array([1.0, 0.0])
+        if (vectors[best] @ back) < 0.7 * length[best] or self.bonded[links[best]].any():
+            return *same, 0.0
+        return np.array([far, far]), same[1], d_behind + float(length[best])
+
+
+def _crossing(pi: Array, pj: Array, direction: Array, side: Array) -> tuple[float, float] | None:
+    """Where a ray from the origin crosses an edge: distance and weight of its second end.
+
+    Args:
+        pi: First end, shape (3,), length.
+        pj: Second end, likewise.
+        direction: Unit vector of the ray, shape (3,).
+        side: Unit vector across it in the surface, shape (3,).
+    """
+    ci, cj = float(pi @ side), float(pj @ side)
+    if abs(ci - cj) < 1e-300:
+        return None
+    w = ci / (ci - cj)
+    if not -1e-6 <= w <= 1.0 + 1e-6:
+        return None
+    w = 0.0 if abs(w) < 1e-6 else 1.0 if abs(w - 1.0) < 1e-6 else w
+    return float(((1.0 - w) * pi + w * pj) @ direction), w
 
 
 def why_no_tip(front: Front) -> str:

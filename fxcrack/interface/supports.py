@@ -242,7 +242,8 @@ def align_frames(
             if len(axes) == gdim:
                 hold[node] = True
                 continue
-            normal = frame[node, :, 0]
+            normal = _symmetric_normal(pair, int(node), axes)
+            frame[node] = _with_normal(frame[node], normal)
             for axis in axes:
                 along = abs(float(axis @ normal))
                 if along > 1.0 - 1e-8:
@@ -263,6 +264,48 @@ def align_frames(
         frames.append(frame)
         held.append(hold)
     return frames, held
+
+
+_TURN = 1.5
+"""How far the normal of a node on a plane of symmetry may be out of it, over half the angle by
+which the surface turns from one facet to the next; on a circle of even facets it is 1."""
+
+
+def _symmetric_normal(pair: Pair, node: int, axes: list[Array]) -> Array:
+    """Normal of a slave node, shape (gdim,), in the planes of symmetry it lies on.
+
+    The normal of a curved surface that ends on a plane of symmetry is that of its last facet, half
+    a facet away from the end; the whole surface would have it in the plane. It is projected into
+    the planes that supports hold the node in if it is out of them by no more than the surface
+    turns there.
+
+    Args:
+        pair: Interface.
+        node: Slave node.
+        axes: Directions in which supports hold the node, each of shape (gdim,).
+    """
+    surface = pair.surface
+    normal = pair.frames[node, :, 0]
+    around = np.unique(surface.facets[(surface.facets == node).any(axis=1)])
+    turn = np.linalg.norm(surface.normals[around] - surface.normals[node], axis=1).max()
+    inside = normal.copy()
+    for axis in axes:
+        along = float(axis @ normal)
+        if 1e-8 <= abs(along) <= _TURN * turn:
+            inside -= (axis @ inside) * axis
+    length = float(np.linalg.norm(inside))
+    return inside / length if length > 0.5 else normal
+
+
+def _with_normal(frame: Array, normal: Array) -> Array:
+    """A frame, shape (gdim, gdim), turned so that its first column is another normal."""
+    if np.array_equal(frame[:, 0], normal):
+        return frame
+    if len(normal) == 2:
+        return np.array([[normal[0], -normal[1]], [normal[1], normal[0]]])
+    first = frame[:, 1] - (frame[:, 1] @ normal) * normal
+    first /= np.linalg.norm(first)
+    return np.stack([normal, first, np.cross(normal, first)], axis=1)
 
 
 def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -> bool:

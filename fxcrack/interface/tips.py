@@ -25,6 +25,11 @@ class Tip:
         d_behind: Distance to the wake point, length.
         width: Front length (times thickness or ring) the node stands for, length.
         area: Area that opens when the node is released, length^2.
+        further_nodes: Two nodes of the next corner point behind the wake point, shape (2,).
+        further_weights: Their weights, shape (2,).
+        d_further: Distance of that point along the surface, 0 where none is open, length.
+        straight: Whether ``d_ahead`` and ``d_behind`` lie on one line through the node; not so
+            where the growth direction points out of the surface at its edge.
         ligament: Whether it is bonded between two open parts on opposite sides; the wake point is
             then the mean of one on either side, lengths are means of both sides, and the growth
             direction is away from the nearer one.
@@ -39,6 +44,10 @@ class Tip:
     d_behind: float
     width: float
     area: float
+    further_nodes: Ints
+    further_weights: Array
+    d_further: float
+    straight: bool
     ligament: bool = False
 
 
@@ -55,6 +64,10 @@ class Tips:
     d_behind: Array
     width: Array
     area: Array
+    further_nodes: Ints
+    further_weights: Array
+    d_further: Array
+    straight: Bools
     ligament: Bools
 
     def __len__(self) -> int:
@@ -156,3 +169,21 @@ def units_of(edges: dict[int, tuple[int, int]], tips: Tips) -> FrontUnits:
     leads = np.array([node in edges for node in at], dtype=bool) | (beside == 0.0)
     share = share[leads] / np.maximum(beside, 1.0) * tips.area
     return FrontUnits(np.flatnonzero(leads), share / share.sum(axis=1, keepdims=True))
+
+
+_SAME = 1e-9
+"""Lengths and cosines that differ by less than this fraction are equal."""
+_PLACES = np.array([0.8147, 0.4351, 0.3836])
+"""Direction along which equal places are ordered: across no symmetry that meshes usually have."""
+
+
+def first_by_place(values: Array, x: Array) -> int:
+    """Position of the largest of some values; of equal ones the first along a fixed direction.
+
+    Args:
+        values: Shape (n,), of the size of lengths in ``x`` or of 1.
+        x: Places they belong to, shape (n, 3); unlike numbers of nodes, these are the mesh's own.
+    """
+    top = float(values.max())
+    equal = np.flatnonzero(values >= top - _SAME * max(abs(top), float(np.abs(values).max())))
+    return int(equal[np.argmin(x[equal] @ _PLACES)]) if len(equal) > 1 else int(equal[0])

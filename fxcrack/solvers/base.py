@@ -201,6 +201,16 @@ class Solver(AnySolver, Protocol):
     def restore_interfaces(self, saved: InterfaceState) -> None:
         """Return to an earlier state of the interfaces alone, on the same retained jumps."""
 
+    def undo(self, saved: InterfaceState, rebases: int) -> None:
+        """Return to an earlier state of the interfaces, be the retained jumps others since.
+
+        Collective.
+
+        Args:
+            saved: The state.
+            rebases: Value of :attr:`rebases` then.
+        """
+
     # -- bonds ---------------------------------------------------------------------------
 
     def release(self, p: int, nodes: Ints, force: Array) -> tuple[float, float]:

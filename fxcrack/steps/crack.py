@@ -11,7 +11,13 @@ from fxcrack.base.arrays import Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion
-from fxcrack.criteria.evaluator import Evaluator, SofteningEvaluator, TipValues, first_crossing
+from fxcrack.criteria.evaluator import (
+    Evaluator,
+    SofteningEvaluator,
+    TipValues,
+    at_rows,
+    first_crossing,
+)
 from fxcrack.criteria.interface_temperature import given_temperature, scene_temperature
 from fxcrack.criteria.probe import FrontProbe, openings
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
@@ -92,11 +98,15 @@ class Crack:
         """
         if not self.criterion.needs_wake_openings:
             return
-        for node, wake in zip(tips.node, tips.wake_nodes, strict=True):
-            if not self.solver.holds(self.p, wake.ravel()):
+        for i in range(len(tips)):
+            tip = at_rows(tips, np.array([i]))
+            # what is behind the wake point counts on uneven spacing only
+            needed = np.concatenate([tip.wake_nodes.ravel(), self.evaluator.needs(tip)])
+            if not self.solver.holds(self.p, needed):
+                where = format_point(self.front.surface.x[tips.node[i]])
                 raise InputError(
                     f"interface '{self.title}': a support holds a node behind the tip at "
-                    f"{format_point(self.front.surface.x[node])} but not its master in the same "
+                    f"{where} but not its master in the same "
                     "way, so the opening there cannot be measured; open one more element, take "
                     "method='closure', or end the support before the crack faces"
                 )

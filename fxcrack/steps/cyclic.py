@@ -7,34 +7,49 @@ way and G is a parabola in it,
     G(x) = 1/2 F(x) w(x)/A,      dG = max G - min G,
 
 so one dense equilibrium per corner of the cycle is enough; where contact changes in between, the
-piece is halved until its middle lies on that parabola, to a tolerance. The number of cycles to the
-next release is then a closed form (:func:`fxcrack.criteria.cycle_jump`), over all interfaces.
+piece is halved until its middle lies on that parabola, to a tolerance. The rates at the beginning
+of an element say which tips are next (:func:`fxcrack.criteria.cycle_jump`, over all interfaces),
+those at its end, once these are released, in how many cycles
+(:func:`fxcrack.criteria.element_cycles`). Where that takes too many, the release is undone.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array
-from fxcrack.criteria import CycleJump, Fatigue, Paris, Regime, cycle_jump, total
+from fxcrack.base.arrays import Array, Bools
+from fxcrack.criteria import (
+    CycleJump,
+    Regime,
+    cycle_jump,
+    total,
+)
 from fxcrack.criteria.energy_release import RateEvaluator
 from fxcrack.criteria.evaluator import repeat_tips
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import Row
 from fxcrack.interface.tips import Tips
 from fxcrack.steps.analysis import Analysis
-from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import TipCycle
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.driver import StepDriver
+from fxcrack.steps.element_growth import (
+    TipsBefore,
+    advance,
+    after_jump,
+    cycles_of,
+    cyclic_parts,
+    joined,
+    lengths_of,
+    together,
+)
 from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.load_path import LoadPath
 from fxcrack.steps.release import release_tips
@@ -100,22 +115,26 @@ class _Cycling:
         else:
             top, event, self._limit = resume["top"], resume["event"], resume["limit"]
             self._begin_at(top)
+        known = False
         while True:
             driver.checkpoint_point(event=event, top=top, limit=self._limit)
-            self._seen = self._stabilised_cycle()
+            if not known:
+                self._seen = self._stabilised_cycle()
             driver.record(event)
             reason = driver.ended()
             if reason:
                 return reason
-            jump = self._jump()
+            jump = self._grow()
             if jump.event in ("arrest", "limit"):
                 driver.record(jump.event)
                 if jump.event == "limit":
                     return f"{self._cycles.n_max:g} cycles done"
                 return "arrest: no tip grows, however many cycles follow"
             event = "unstable" if jump.event == "unstable" else "release"
-            self._seen = []
-            self._release(jump, fatigue.N)
+            known = event == "release"
+            if not known:
+                self._seen = []
+                self._release(jump.release, fatigue.N)
 
     def columns(self) -> Row:
         """Number of cycles, and what the present cycle does at the tips of largest f."""
@@ -246,48 +265,159 @@ class _Cycling:
 
     # -- over the cycles to the next release ---------------------------------------------
 
-    def _jump(self) -> CycleJump:
-        """Jump over cycles like the present one, all interfaces together, and tabulate it."""
-        fatigue, before = self._analysis.fatigue, self._analysis.fatigue.N
+    def _grow(self) -> CycleJump:
+        """Cycles to the next release, all interfaces together; the release, unless it is unstable.
+
+        Tips are tried in the order in which the rates at the beginning of their elements let them
+        pass; those that come to the threshold within their element stay where they are. Where the
+        cycles that are allowed do not suffice, nothing is released.
+        """
+        front, seen = self._front(), self._seen
+        tried = np.zeros(len(front.rates.dG), dtype=np.bool_)
+        best: tuple[float, CycleJump] | None = None
+        jump = self._jump(front, tried, np.inf)
+        while jump.event == "growth" and (best is None or jump.cycles - front.N < best[0]):
+            undo = self._undoing()
+            self._seen = []
+            self._release(jump.release, front.N)
+            after = self._stabilised_cycle() if self._has_tips() else []
+            needed = cycles_of(
+                front, jump.release, seen, after, self._analysis.active, self._analysis.tip_values
+            )
+            tried = tried | jump.release
+            if best is None or needed < best[0]:
+                best = (needed, jump)
+            following = self._jump(front, tried, np.inf) if not tried.all() else None
+            more = (
+                following is not None
+                and following.event == "growth"
+                and following.cycles - front.N < best[0]
+            )
+            allowed = np.isfinite(needed) and front.N + needed <= self._limit
+            if not more and best[1] is jump and allowed:
+                done = after_jump(front, jump, needed)
+                self._keep(front, done, seen)
+                self._seen = after
+                return done
+            undo()
+            self._seen = seen
+            if following is None or not more:
+                break
+            jump = following
+        if best is not None and np.isfinite(best[0]) and front.N + best[0] <= self._limit:
+            # another group of tips is first after all
+            needed, jump = best
+            self._seen = []
+            self._release(jump.release, front.N)
+            after = self._stabilised_cycle() if self._has_tips() else []
+            done = after_jump(front, jump, needed)
+            self._keep(front, done, seen)
+            self._seen = after
+            return done
+        if best is not None:
+            waits = np.isfinite(best[0])
+            jump = self._jump(front, np.zeros_like(tried) if waits else tried, self._limit,
+                              short=bool(waits))  # fmt: skip
+        elif jump.event == "unstable" and jump.cycles > self._limit:
+            jump = self._jump(front, tried, self._limit)
+        self._keep(front, jump, seen)
+        return jump
+
+    def _front(self) -> TipsBefore:
+        """What is known of all tips at the present number of cycles."""
+        fatigue = self._analysis.fatigue
         criteria = [cyclic_parts(g)[0] for g in self._analysis.active]
         tips = [v.tips for v in self._analysis.tip_values]
         counts = [len(t) for t in tips]
         on = [(g.p, t.node) for g, t in zip(self._analysis.active, tips, strict=True)]
         keep = np.repeat([c.credit for c in criteria], counts)
-        credit = np.concatenate([fatigue.credit[p][nodes] for p, nodes in on])
-        jump = cycle_jump(
-            together([c.paris for c in criteria], counts),
-            np.concatenate([c.dG for c in self._seen]),
-            np.concatenate([c.G_max for c in self._seen]),
-            np.concatenate([c.G_c for c in self._seen]),
-            np.concatenate([advance(t) for t in tips]),
-            cycles=before,
+        return TipsBefore(
+            N=fatigue.N,
+            law=together([c.paris for c in criteria], counts),
+            tips=tips,
+            counts=counts,
+            rates=joined(self._seen),
+            da=np.concatenate([advance(t) for t in tips]),
+            grown=np.where(
+                keep, np.concatenate([fatigue.credit[p][nodes] for p, nodes in on]), 0.0
+            ),
+            keep=keep,
             initiated=np.concatenate([~fatigue.waiting[p][nodes] for p, nodes in on]),
-            credit=credit if keep.any() else None,
             tolerance=min(c.tolerance for c in criteria),
-            limit=self._limit,
+            lengths=[lengths_of(g, t) for g, t in zip(self._analysis.active, tips, strict=True)],
+            records=[len(g.records) for g in self._analysis.active],
         )
-        fatigue.N = jump.cycles
-        grown = np.where(keep, 0.0 if jump.credit is None else jump.credit, 0.0)
-        at = np.cumsum([0, *counts])
-        for i, (g, (p, nodes)) in enumerate(zip(self._analysis.active, on, strict=True)):
-            part = slice(at[i], at[i + 1])
-            fatigue.waiting[p][nodes] = ~jump.initiated[part]
-            fatigue.credit[p][nodes] = grown[part]
-            fatigue.tabulate(
-                before, g.title, nodes, _lengths(g, tips[i]), self._seen[i], jump.release[part]
-            )
-        return jump
 
-    def _release(self, jump: CycleJump, N: float) -> None:
-        """Release at the maximum of the cycle; these bonds fail at a number of cycles."""
+    def _jump(
+        self, front: TipsBefore, stopped: Bools, limit: float, *, short: bool = False
+    ) -> CycleJump:
+        """Jump by the rates at the beginning of the elements.
+
+        Args:
+            front: All tips.
+            stopped: Tips that do not pass their element, shape (n_tips,).
+            limit: Cycles at which the analysis ends.
+            short: Whether the limit comes first whatever these rates say.
+        """
+        rates = front.rates
+        return cycle_jump(
+            front.law,
+            np.where(stopped, 0.0, rates.dG),
+            np.where(stopped, 0.0, rates.G_max),
+            rates.G_c,
+            front.da,
+            cycles=front.N,
+            initiated=front.initiated,
+            credit=front.grown if front.keep.any() else None,
+            tolerance=front.tolerance,
+            limit=limit,
+            short=short,
+        )
+
+    def _keep(self, front: TipsBefore, jump: CycleJump, seen: list[TipCycle]) -> None:
+        """Keep what a jump has changed, tabulate the cycle it began with, date its releases."""
+        fatigue = self._analysis.fatigue
+        fatigue.N = jump.cycles
+        grown = np.where(front.keep, 0.0 if jump.credit is None else jump.credit, 0.0)
+        at = np.cumsum([0, *front.counts])
+        for i, g in enumerate(self._analysis.active):
+            part, nodes = slice(at[i], at[i + 1]), front.tips[i].node
+            fatigue.waiting[g.p][nodes] = ~jump.initiated[part]
+            fatigue.credit[g.p][nodes] = grown[part]
+            fatigue.tabulate(front.N, g.title, nodes, front.lengths[i], seen[i], jump.release[part])
+            if jump.event == "growth":
+                new = g.records[front.records[i] :]
+                g.records[front.records[i] :] = [replace(r, DBT=jump.cycles) for r in new]
+
+    def _has_tips(self) -> bool:
+        return any(len(v.tips) for v in self._analysis.tip_values)
+
+    def _release(self, chosen: Bools, N: float) -> None:
+        """Release tips at the maximum of the cycle; these bonds fail at a number of cycles."""
         analysis = self._analysis
         counts = np.cumsum([len(v.tips) for v in analysis.tip_values])
-        parts = np.split(jump.release, counts[:-1])
-        for (g, v), chosen in zip(analysis.at_tips(), parts, strict=True):
-            if chosen.any():
-                release_tips(analysis, g, v, np.flatnonzero(chosen), N)
+        parts = np.split(chosen, counts[:-1])
+        for (g, v), mine in zip(analysis.at_tips(), parts, strict=True):
+            if mine.any():
+                release_tips(analysis, g, v, np.flatnonzero(mine), N)
         analysis.update_tips()
+
+    def _undoing(self) -> Callable[[], None]:
+        """Remember the present state; the result returns to it."""
+        analysis, solver = self._analysis, self._analysis.condensed
+        state, rebases = solver.interface_state(), solver.rebases
+        balance = analysis.balance.copy()
+        known = [(g, len(g.records), g.n_released) for g in analysis.active]
+
+        def undo() -> None:
+            solver.undo(state, rebases)
+            analysis.balance = balance
+            for g, n_records, n_released in known:
+                del g.records[n_records:]
+                g.n_released = n_released
+            analysis.update_tips()
+
+        return undo
 
 
 @dataclass(frozen=True)
@@ -309,56 +439,6 @@ class _Instant:
     def follows(self, before: _Instant) -> bool:
         """Whether everything is linear between an earlier instant and this one."""
         return self.straight or self.contact == before.contact
-
-
-@dataclass(frozen=True)
-class _SideBySide(Paris):
-    """Laws of several interfaces for the tips of all of them, one interface after the other.
-
-    Attributes:
-        laws: One per interface.
-        counts: Number of tips of each.
-    """
-
-    laws: tuple[Paris, ...] = ()
-    counts: tuple[int, ...] = ()
-
-    def _each(self, name: str, *values: npt.ArrayLike) -> npt.NDArray[Any]:
-        parts = [np.split(np.asarray(v), np.cumsum(self.counts)[:-1]) for v in values]
-        each = zip(self.laws, *parts, strict=True)
-        return np.concatenate([getattr(law, name)(*part) for law, *part in each])
-
-    def onset_cycles(self, dG: npt.ArrayLike) -> Array:
-        """Cycles until growth starts."""
-        return self._each("onset_cycles", dG)
-
-    def growth_rate(self, dG: npt.ArrayLike) -> Array:
-        """Growth per cycle in the Paris regime."""
-        return self._each("growth_rate", dG)
-
-    def regime(self, G_max: npt.ArrayLike, G_c: npt.ArrayLike) -> npt.NDArray[np.int64]:
-        """Regime of each tip."""
-        return self._each("regime", G_max, G_c)
-
-
-def cyclic_parts(crack: Crack) -> tuple[Fatigue, RateEvaluator]:
-    """Criterion and evaluator of a crack that grows in cycles.
-
-    :func:`fxcrack.steps.cycles.check_criteria` has let nothing else pass.
-    """
-    return cast(Fatigue, crack.criterion), cast(RateEvaluator, crack.evaluator)
-
-
-def together(laws: Sequence[Paris], counts: Sequence[int]) -> Paris:
-    """One law for the tips of several interfaces, given one interface after the other.
-
-    Args:
-        laws: One per interface.
-        counts: Number of tips of each.
-    """
-    first = laws[0]
-    constants = (first.c1, first.c2, first.c3, first.c4, first.r1, first.r2)
-    return _SideBySide(*constants, laws=tuple(laws), counts=tuple(counts))
 
 
 def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> Array:
@@ -388,15 +468,3 @@ def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> A
         x = np.clip(_GRID[i] + _GRID[1] * shift, 0.0, 1.0)[:, None]
         rates.append(evaluator.rates(tips, (1.0 - x) * a + x * b)[None])
     return np.concatenate(rates)
-
-
-def advance(tips: Tips) -> Array:
-    """Distance by which releasing each tip moves the front, shape (n,), length."""
-    return np.where(tips.d_ahead > 0.0, tips.d_ahead, tips.area / tips.width)
-
-
-def _lengths(crack: Crack, tips: Tips) -> list[float]:
-    """Crack length of each tip: its own on a line, the mean of the front on a surface."""
-    mean = crack.extent.length(tips)
-    own = dict(crack.extent.lengths()) if crack.front.surface.dim == 1 else {}
-    return [own.get(int(node), mean) for node in tips.node]

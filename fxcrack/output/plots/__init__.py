@@ -11,6 +11,7 @@ from fxcrack.output.plots.curves import (
     resistance,
 )
 from fxcrack.output.plots.deformed import deformed
+from fxcrack.output.plots.fatigue import paris, tip_growth
 from fxcrack.output.plots.front_advance import front_advance
 
 __all__ = [
@@ -19,6 +20,8 @@ __all__ = [
     "growth_rows",
     "load_curve",
     "load_opening",
+    "paris",
     "r_curve",
     "resistance",
+    "tip_growth",
 ]
