@@ -53,8 +53,8 @@ def tip_growth(history: History, interface: Interface | str) -> TipGrowth:
     if not of.any():
         known = ", ".join(f"'{n}'" for n in dict.fromkeys(table["interface"]))
         raise InputError(f"interface '{name}' has no tips in the cycles; those with are {known}")
-    values = [np.array(table[k], dtype=float)[of] for k in ("N", "a", "dG", "dadN")]
-    return TipGrowth(*values, np.array(table["node"], dtype=np.int64)[of])
+    columns = {k: np.array(table[k], dtype=float)[of] for k in ("N", "a", "dG", "dadN")}
+    return TipGrowth(**columns, node=np.array(table["node"], dtype=np.int64)[of])
 
 
 def paris(
