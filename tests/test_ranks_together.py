@@ -156,7 +156,8 @@ def test_a_rank_that_waits_long_says_for_what() -> None:
 
 
 @pytest.mark.slow
-def test_an_exit_inside_a_run_ends_the_job() -> None:
+def test_an_exit_inside_a_run_leaves_nobody_waiting() -> None:
+    """Linear bodies may end the run without a message; the next collective function tells."""
     program = """
 from fxcrack.meshes.dcb import dcb_2d
 bond = fx.Interface("upper_face", "lower_face", bonded=lambda x: x[0] >= 3.0, name="bond")
@@ -169,6 +170,7 @@ def observe(event, row):
     if rank == 1:
         sys.exit()
 scene.run(fx.Static(until=fx.Releases(3)), observers=[observe], progress=False)
+scene.history.to_csv("/dev/null")
 print('went on')
 """
     done = run_on_two_ranks(program)
