@@ -9,10 +9,10 @@ import sys
 import tomllib
 from pathlib import Path
 
+import fxcrack_command
 import pytest
 
 import fxcrack
-import fxcrack_command
 from fxcrack import cli
 from fxcrack.base import processes, requirements
 from fxcrack.base.errors import InputError
@@ -86,7 +86,7 @@ def test_types_are_part_of_the_package() -> None:
     assert (Path(fxcrack.__file__).parent / "py.typed").is_file()
     tools = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
     assert "py.typed" in tools["package-data"]["fxcrack"]
-    assert tools["py-modules"] == ["fxcrack_command"]
+    assert "fxcrack_command" in tools["packages"]
 
 
 @pytest.mark.slow

@@ -27,7 +27,7 @@ ORDER = (
     *("base", "mesh", "meshes", "continuum", "interface", "condensation", "equilibrium"),
     *("solvers", "criteria", "history", "steps", "restart", "output"),
     *("effects", "error_estimate", "beam_theory", "scene", "deck"),
-    *("public names", "demos", "accuracy", "bench", "cli"),
+    *("public names", "demos", "accuracy", "bench", "cli", "command"),
 )
 """From the bottom up; "public names" is ``fxcrack/__init__.py``."""
 

@@ -1,7 +1,8 @@
 """The command ``fxcrack``: answers ``--help`` and ``--version`` at once, and else hands on.
 
-It stands beside the package because importing anything of the package loads DOLFINx, which takes
-seconds. What the commands are is read from the source of :mod:`fxcrack.cli`.
+It is installed beside the package, as ``fxcrack_command``, because importing anything of the package
+loads DOLFINx, which takes seconds. What the commands are is read from the source of
+:mod:`fxcrack.cli`.
 """
 
 from __future__ import annotations
