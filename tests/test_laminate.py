@@ -94,7 +94,7 @@ def test_ways_to_write_one_laminate() -> None:
         (lambda: fx.Laminate(["0"], CARBON, 0.1), "neither a Ply"),
         (lambda: fx.Laminate([0], CARBON, 0.1).repeated(0), "positive number"),
         (lambda: fx.Laminate([0], CARBON, 0.1, frame=((1, 0, 0), (2, 0, 0))), "parallel"),
-        (lambda: fx.Laminate([0], CARBON, 0.1, frame=((1, 0), (0, 1))), "two vectors"),
+        (lambda: fx.Laminate([0], CARBON, 0.1, frame=((1, 0), (0, 1))), "two direction vectors"),
         (lambda: fx.Ply(-0.1), "positive"),
         (lambda: fx.Ply("0.1"), "not a number"),
         (lambda: fx.Ply(0.1, np.nan), "finite"),

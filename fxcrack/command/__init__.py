@@ -1,7 +1,7 @@
 """The command ``fxcrack``: answers ``--help`` and ``--version`` at once, and else hands on.
 
-It is installed beside the package, as ``fxcrack_command``, because importing anything of the package
-loads DOLFINx, which takes seconds. What the commands are is read from the source of
+It is installed beside the package, as ``fxcrack_command``, because importing anything of the
+package loads DOLFINx, which takes seconds. What the commands are is read from the source of
 :mod:`fxcrack.cli`.
 """
 

@@ -241,8 +241,9 @@ class PointForce:
 
 
 def _check_names(owner: str, where: object, name: object) -> None:
-    """Check the name of a group and the name in the history."""
-    text(owner, "where", where)
+    """Check the name of a group, or the face of a shell, and the name in the history."""
+    if not isinstance(where, Face):
+        text(owner, "where", where)
     text(owner, "name", name, optional=True)
 
 
@@ -285,6 +286,12 @@ class Moment:
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
 
+    def __post_init__(self) -> None:
+        """Check names and components."""
+        _check_names("Moment", self.where, self.name)
+        owner = f"load '{self.title}'"
+        keep(self, value=_components(owner, self.value, functions=True))
+
     @property
     def title(self) -> str:
         """Name in the history."""
@@ -306,6 +313,12 @@ class PointMoment:
     value: tuple[float, ...]
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Check names and components."""
+        _check_names("PointMoment", self.where, self.name)
+        owner = f"load '{self.title}'"
+        keep(self, value=_components(owner, self.value, functions=False))
 
     @property
     def title(self) -> str:

@@ -472,8 +472,9 @@ class RateEvaluator(SofteningEvaluator):
                 continue
             unit = np.intersect1d(tips.force_nodes[rows], left)
             left = np.setdiff1d(left, unit)
-            energy = float(critical[k] * front.swept(int(tips.node[first]), unit))
-            out.append(CohesiveUnit(unit, energy, bool(rates[k, 0] <= 0.0)))
+            area = front.swept(int(tips.node[first]), unit)
+            energy = float(critical[k] * area)
+            out.append(CohesiveUnit(unit, energy, bool(rates[k, 0] <= 0.0), area))
         return out
 
     def breaks(self) -> tuple[float, ...]:

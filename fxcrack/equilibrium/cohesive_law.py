@@ -28,11 +28,13 @@ class CohesiveUnit(NamedTuple):
         nodes: Slave nodes, shape (n,).
         energy: What they dissipate together until they are free, force times length.
         pressed: Whether their faces are pressed together: mode I takes no part.
+        area: Area that their release sweeps, length^2.
     """
 
     nodes: Ints
     energy: float
     pressed: bool
+    area: float
 
 
 @dataclass

@@ -80,6 +80,7 @@ class SofteningBonds:
         top: Largest one so far, length.
         direction: Direction of the opening, shape (n_rows, gdim).
         spent: Energy the bond has taken, force times length.
+        area: Area that its release sweeps, length^2; 0 before.
         freed: Whether the bond has softened and is free, shape (n_rows,).
     """
 
@@ -90,6 +91,7 @@ class SofteningBonds:
     top: Array
     direction: Array
     spent: Array
+    area: Array
     freed: Bools
 
     @classmethod
@@ -103,6 +105,7 @@ class SofteningBonds:
             top=np.zeros(n),
             direction=np.zeros((n, gdim)),
             spent=np.zeros(n),
+            area=np.zeros(n),
             freed=np.zeros(n, dtype=bool),
         )
 
@@ -205,7 +208,7 @@ class InterfaceDynamics:
         self.set_ties(tied)
         self.energies.ties += before - self.lumped.excess_energy(self.v)
 
-    def soften(self, rows: Ints, force: Array, onset: Array, energy: Array) -> None:
+    def soften(self, rows: Ints, force: Array, onset: Array, energy: Array, area: Array) -> None:
         """Let the bonds of rows that were released soften with their opening.
 
         Args:
@@ -213,6 +216,7 @@ class InterfaceDynamics:
             force: Bond forces on the slaves at debonding, shape (n, gdim), force.
             onset: Size of the force at which the law begins over the one at debonding, shape (n,).
             energy: What each bond is to spend, shape (n,), force times length.
+            area: Area that the release of each sweeps, shape (n,), length^2.
         """
         bonds, size = self.bonds, np.linalg.norm(force, axis=1)
         some = size > 0.0
@@ -221,6 +225,7 @@ class InterfaceDynamics:
         bonds.strength[rows] = size * onset[some]
         bonds.final[rows] = 2.0 * energy[some] / bonds.strength[rows]
         bonds.low[rows] = bonds.top[rows] = 0.0
+        bonds.area[rows] = area[some]
         bonds.active[rows] = True
         self._soften()
 

@@ -291,7 +291,7 @@ class InterfaceSolver(ABC):
         """
         system, state = self.system, self.state
         bonds, force = [], state.force.copy()
-        for nodes, spend, pressed in units:
+        for nodes, spend, pressed, _ in units:
             row, local = np.nonzero(self.index[p][nodes] >= 0)
             components = self.index[p][nodes[row], local]
             traction = -system.forces(state, components)

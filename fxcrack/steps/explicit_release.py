@@ -13,6 +13,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.criteria import ProgressiveRelease, ReleaseLaw
+from fxcrack.criteria.closure_lengths import uneven
 from fxcrack.criteria.crack_closure import closure_weights
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues
@@ -96,8 +97,11 @@ class ReleaseControl:
         toughness = self._crack.evaluator.toughness
         assert toughness is not None
         least = least_critical(criterion.law, toughness[tips.node])
+        ahead = np.where(tips.straight, tips.d_ahead, tips.d_behind)
+        if criterion.normalisation == "equal_length" and uneven(ahead, tips.d_behind).any():
+            return zero  # the product of force and opening alone is no bound
         lengths = tips.d_ahead, tips.d_behind, tips.width
-        weights = closure_weights(*lengths, 1, criterion.normalisation)[:, 0]
+        weights = closure_weights(*lengths, 1, criterion.normalisation, tips.straight)[:, 0]
         power = 1.0 if criterion.law.degree is None else 1.0 / criterion.law.degree
         if criterion.law.degree is None and self.onset < 1.0:
             return zero
@@ -130,7 +134,7 @@ class ReleaseControl:
         forces = solver.bonds[rows]
         crack.record(nodes, values, solver.state, solver.at)
         if law.driver == "opening":
-            energy, force = self._to_spend(nodes, values, forces)
+            energy, area, force = self._to_spend(nodes, values, forces)
         crack.front.release(nodes)
         dynamics = solver.dynamics
         dynamics.release(rows)
@@ -138,29 +142,31 @@ class ReleaseControl:
         if law.driver == "opening":
             f = values.f[np.searchsorted(values.tips.node, nodes)]
             power = 0.5 if crack.evaluator.degree is None else 1.0 / crack.evaluator.degree
-            dynamics.soften(rows, force, (self.onset / f) ** power, energy)
+            dynamics.soften(rows, force, (self.onset / f) ** power, energy, area)
         elif law.driver == "increments":
             dynamics.fading.append(Fading(rows, forces, int(getattr(law, "increments", 1)), 0.0))
         elif viscosity > 0.0:
             dynamics.fading.append(Fading(rows, forces, 0, viscosity))
 
-    def _to_spend(self, nodes: Ints, values: TipValues, forces: Array) -> tuple[Array, Array]:
-        """Energy that each node is to spend, shape (n,), and the force that softens.
+    def _to_spend(
+        self, nodes: Ints, values: TipValues, forces: Array
+    ) -> tuple[Array, Array, Array]:
+        """Energy of each node and the area it sweeps, shape (n,), and the force that softens.
 
         Where faces are pressed together contact keeps the normal force from then on.
         """
         crack, solver = self._crack, self._solver
         evaluator = crack.evaluator
         units = _softening(evaluator).to_soften(nodes, values, self.law)
-        energy, force = np.zeros(len(nodes)), forces.copy()
+        energy, area, force = np.zeros(len(nodes)), np.zeros(len(nodes)), forces.copy()
         normals = solver.lumped.frames[solver.row_of[crack.p][nodes]][:, :, 0]
         for unit in units:
             at = np.searchsorted(nodes, unit.nodes)
-            energy[at] = unit.energy / len(at)
+            energy[at], area[at] = unit.energy / len(at), unit.area / len(at)
             if unit.pressed:
                 along = np.maximum((force[at] * normals[at]).sum(axis=1), 0.0)
                 force[at] -= along[:, None] * normals[at]
-        return energy, force
+        return energy, area, force
 
 
 def _softening(evaluator: object) -> SofteningEvaluator:

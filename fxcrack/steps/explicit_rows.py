@@ -102,7 +102,7 @@ def explicit_row(
 
 
 def spent_per_area(solver: ExplicitSolver, crack: Crack) -> float:
-    """Energy that the bonds of a crack have really taken, over their area, force/length.
+    """Energy that the bonds of a crack have really taken, over the area swept, force/length.
 
     Of bonds that softened and are free; 0 before the first of them.
     """
@@ -111,8 +111,7 @@ def spent_per_area(solver: ExplicitSolver, crack: Crack) -> float:
     nodes = nodes[bonds.freed[rows[nodes]]]
     if not len(nodes):
         return 0.0
-    areas = solver.pairs[crack.p].surface.areas[nodes]
-    return float(bonds.spent[rows[nodes]].sum() / areas.sum())
+    return float(bonds.spent[rows[nodes]].sum() / bonds.area[rows[nodes]].sum())
 
 
 def imbalance(row: Row) -> float:
