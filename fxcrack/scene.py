@@ -74,7 +74,7 @@ from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import CrackLength, Time
-from fxcrack.steps.energy_check import check_energy
+from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_driver import run_explicit
 from fxcrack.steps.explicit_rules import check_interfaces, warn_of_step_release
@@ -405,7 +405,14 @@ class Scene:
             step, restarts, progress=progress, observers=observers
         )
         self.history.details = self._details()
-        check_energy(self.history, first)
+        free = self.input.newton is not None and self.input.newton.balance == np.inf
+        newton = isinstance(self.solver, NewtonSolver)
+        check_energy(
+            self.history,
+            first,
+            refused=np.inf if free else REFUSED,
+            round_off=self.solver.energy_round_off() if newton else 0.0,
+        )
         if accuracy is not None and not isinstance(step, Explicit):
             self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))
         return self.history

@@ -53,7 +53,7 @@ def tractions(scene: fx.Scene) -> Array:
     [
         ({"friction": 0.3}, "friction needs contact"),
         ({"friction": -0.1, "contact": True}, "coefficient of friction is -0.1"),
-        ({"friction": float("nan"), "contact": True}, "coefficient of friction is nan"),
+        ({"friction": float("nan"), "contact": True}, "friction = nan; give the coefficient"),
         ({"friction": True, "contact": True}, "give the coefficient"),
         ({"friction": 0.3, "contact": True, "normal_only": True}, "normal direction only"),
     ],

@@ -151,11 +151,13 @@ def test_soft_motions_are_no_other_bodies(node: int, refused: bool) -> None:
     solver: Any = SimpleNamespace(
         system=system, state=SimpleNamespace(jump=jump), index=[np.array([[0], [1]])]
     )
+    linear = SimpleNamespace(solver="linear")
+    analysis: Any = SimpleNamespace(plan=linear, solver=solver, condensed=solver)
     saved = jump[:, None].copy()
-    _check_jumps(solver, {"jump[0]": saved})
+    _check_jumps(analysis, {"jump[0]": saved})
     saved[node] += 5e-6
     if refused:
         with pytest.raises(fx.InputError, match="the checkpoint does not fit"):
-            _check_jumps(solver, {"jump[0]": saved})
+            _check_jumps(analysis, {"jump[0]": saved})
     else:
-        _check_jumps(solver, {"jump[0]": saved})
+        _check_jumps(analysis, {"jump[0]": saved})

@@ -138,7 +138,7 @@ def criterion_lines(title: str, criterion: Criterion, nodal: bool) -> list[str]:
 
 
 def _rates(title: str, criterion: RateCriterion, nodal: bool) -> tuple[str, list[str]]:
-    if criterion.method != "vcct" or criterion.normalisation != "tributary":
+    if criterion.method != "vcct" or criterion.normalisation != "equal_length":
         raise InputError(
             f"write_deck: interface '{title}': method='{criterion.method}' and normalisation="
             f"'{criterion.normalisation}' have no word in a deck; the defaults are what it is read "

@@ -59,9 +59,13 @@ def softening_force(
     linear = change + strength * compliance - slope * compliance * free
     constant = strength * free - 0.5 * slope * free**2 + known
     envelope = _smaller_root(square, linear, constant)
-    # a bond that softens faster than masses can follow in an increment breaks in it
-    breaks = (free - compliance * envelope > final) | (square <= 0.0)
-    last = _smaller_root(compliance, change, 0.5 * strength * final + known)
+    whole = 0.5 * strength * final + known
+    last = _smaller_root(compliance, change, whole)
+    # a bond that softens faster than masses can follow in an increment breaks in it, if the masses
+    # have the energy for that
+    able = (change > 0.0) & (change**2 >= 4.0 * compliance * whole)
+    able &= free - compliance * last > final
+    breaks = (free - compliance * envelope > final) | ((square <= 0.0) & able)
     return np.asarray(np.where(grows, np.maximum(np.where(breaks, last, envelope), 0.0), force))
 
 

@@ -610,6 +610,10 @@ class NewtonSolver(InterfaceSolver):
             spent["pairing_energy"] = self.pairing.energy
         return spent
 
+    def energy_round_off(self) -> float:
+        """Work of the round-off of the bodies' forces, force times length; collective."""
+        return self.tangent.round_off * float(self.u.norm())
+
     def extra_work(self, state: Equilibrium) -> float:
         """Work of loads that follow the bodies and of a temperature; collective."""
         return self.bodies.work()

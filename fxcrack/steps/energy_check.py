@@ -36,19 +36,26 @@ _ADVICE = (
 )
 
 
-def check_energy(history: History, first: int) -> None:
+def check_energy(
+    history: History, first: int, *, refused: float = REFUSED, round_off: float = 0.0
+) -> None:
     """Warn of, or refuse, a step whose energies do not balance; collective.
 
     Args:
         history: All rows so far; they are kept.
         first: Number of the first row of the step.
+        refused: Part of the largest energy beyond which the step is refused; infinite where the
+            user has asked for increments without a bound on their balance.
+        round_off: Round-off of the work of the bodies' forces, force times length.
 
     Raises:
-        EnergyError: More than :data:`REFUSED` of the largest energy is missing, or an energy is no
+        EnergyError: More than ``refused`` of the largest energy is missing, or an energy is no
             finite number.
     """
     comm = history.comm
-    part, made, time = comm.bcast(_errors(history.rows, first) if comm.rank == 0 else None)
+    part, made, time = comm.bcast(
+        _errors(history.rows, first, round_off) if comm.rank == 0 else None
+    )
     if part == np.inf:
         raise EnergyError(
             f"an energy of the step is no finite number at time {time:g}: loads or displacements "
@@ -56,10 +63,10 @@ def check_energy(history: History, first: int) -> None:
             "are kept: scene.history",
             part,
         )
-    if part > REFUSED:
+    if part > refused:
         raise EnergyError(
             f"the energy balance of the step is off by {part:.2g} of the largest energy at time "
-            f"{time:g}, more than {REFUSED:.0%}, so the results are wrong from there on or before: "
+            f"{time:g}, more than {refused:.0%}, so the results are wrong from there on or before: "
             f"{_ADVICE}. They are kept: scene.history",
             part,
         )
@@ -76,14 +83,15 @@ def check_energy(history: History, first: int) -> None:
         )
 
 
-def _errors(rows: Sequence[Row], first: int) -> tuple[float, float, float]:
-    """Errors of some rows in parts of the largest energy.
+def _errors(rows: Sequence[Row], first: int, round_off: float) -> tuple[float, float, float]:
+    """Errors of some rows in parts of the largest energy, or of round-off if that is larger.
 
     Returns:
         The largest imbalance, infinite if one is not a number; the energy that time integration
         has made in the end; the time of the imbalance.
     """
     size = max((max(_energy(r), _ROUND_OFF * _products(r)) for r in rows), default=0.0)
+    size = max(size, round_off)
     if not size > 0.0 or first >= len(rows):
         return 0.0, 0.0, 0.0
     parts = np.array([abs(float(r["balance"])) / size for r in rows[first:]])
