@@ -214,5 +214,5 @@ def test_search_among_yielding_bodies_and_softening_bonds_is_bounded(
     jumps = [r["f[b]"] for r in history if r["event"] == "snap"]
     assert len(met) == 4 and all(f > 1.0 for f in jumps)
     assert np.sort(met)[: 4 - len(jumps)] == pytest.approx([1.0] * (4 - len(jumps)), abs=1e-7)
-    # halving to round-off needs 44 trials where f jumps, other events a few each
-    assert len(trials) < (44 + 3) * len(jumps) + 4 * 10
+    # halving to round-off needs 44 trials an event, and is never more than 3 behind
+    assert len(trials) < 4 * (44 + 3)
