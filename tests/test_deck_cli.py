@@ -101,7 +101,7 @@ OTHERS = {
     "cps4r_parametric": "*USER MATERIAL is refused",
     "cube_mixed_case": "",
     "dcb3d_coh": "COH3D8 is refused: cohesive elements",
-    "dcb3d_tie": "explicit dynamics is not available yet",
+    "dcb3d_tie": "explicit dynamics is not read from decks yet",
     "dcbenf_wedges": "C3D15 is refused: prisms",
     "distributing": "*DISTRIBUTING is refused",
     "gaps_in_numbers": "",

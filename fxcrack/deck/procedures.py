@@ -249,7 +249,10 @@ def _dynamic(asked: _Asked) -> Found:
 
 def _explicit(asked: _Asked) -> Found:
     """``*DYNAMIC, EXPLICIT``: second field of the data line is the length of the step."""
-    asked.card.fail("explicit dynamics is not available yet; implicit *DYNAMIC and *STATIC are")
+    asked.card.fail(
+        "explicit dynamics is not read from decks yet: run it in Python (fx.Explicit), or "
+        "take implicit *DYNAMIC"
+    )
 
 
 def _cyclic(asked: _Asked) -> Found:
