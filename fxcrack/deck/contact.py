@@ -107,7 +107,7 @@ class Contacts:
         if card.has("SEARCH NSET") and card.has("SEARCH ABOVE", "SEARCH BELOW"):
             card.fail("SEARCH NSET excludes SEARCH ABOVE and SEARCH BELOW; give one of them")
         card.fail(
-            "it belongs to explicit dynamics with general contact, which is not read from decks yet; in "
+            "it belongs to explicit dynamics with general contact, which decks do not give yet; in "
             "quasi-static decks bond the pair by *INITIAL CONDITIONS, TYPE=CONTACT"
         )
 
