@@ -406,12 +406,12 @@ class Scene:
         )
         self.history.details = self._details()
         free = self.input.newton is not None and self.input.newton.balance == np.inf
-        newton = isinstance(self.solver, NewtonSolver)
+        solver = self.solver
         check_energy(
             self.history,
             first,
             refused=np.inf if free else REFUSED,
-            round_off=self.solver.energy_round_off() if newton else 0.0,
+            round_off=solver.energy_round_off() if isinstance(solver, NewtonSolver) else 0.0,
         )
         if accuracy is not None and not isinstance(step, Explicit):
             self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))

@@ -62,8 +62,8 @@ _SHAPES = {
 _MODELS = {"CPE": "plane strain", "CPS": "plane stress", "CAX": "axisymmetric", "C3D": "solid"}
 
 _REFUSED = (
-    (r"S[0-9]|S3|STRI|SAX", "shells are not read from decks yet (fx.Shell in Python); use continuum "
-     "shells (SC8R) or solid elements (C3D20R)"),
+    (r"S[0-9]|S3|STRI|SAX", "shells are not read from decks yet (fx.Shell in Python); use "
+     "continuum shells (SC8R) or solid elements (C3D20R)"),
     (r"SC6", "prisms have facets of two kinds, which DOLFINx meshes do not; use SC8R"),
     (r"CSS8", "solid shells are not available; use solid elements such as C3D8I"),
     (r"C3D(6|15|18)", "prisms have facets of two kinds, which DOLFINx meshes do not; use hexahedra "
