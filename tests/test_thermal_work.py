@@ -404,7 +404,7 @@ def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
         fx.Temperature(np.nan)
     with pytest.raises(InputError, match="expansion = nan must be finite"):
         fx.Isotropic(E, NU, expansion=np.nan)
-    with pytest.raises(InputError, match="three numbers, one per axis"):
+    with pytest.raises(InputError, match="3 numbers, one per axis"):
         fx.Orthotropic((1, 1, 1), (0, 0, 0), (1, 1, 1), expansion=(1.0, 2.0))
     with pytest.raises(InputError, match=r"density = -1.0 must be positive"):
         fx.Isotropic(E, NU, density=-1.0)
