@@ -252,7 +252,10 @@ class ShellCells:
         graded = any(i for i, _ in self._powers)
         parts = []
         for axis, tag in tags.items():
-            for weight, in_plane in ((1.0 - self._weight, 2), (self._weight, 3)):
+            # a coefficient of its own: UFL 2024.2 (DOLFINx 0.9) takes integrals of one integrand
+            # over several marks for one, whatever their rules are
+            one = fem.Constant(self._mesh.domain, 1.0)
+            for weight, in_plane in ((one - self._weight, 2), (one * self._weight, 3)):
                 parts.append((weight, dx(tag, metadata=rule(axis, in_plane, 5 if graded else 3))))
         return WeightedMeasure(parts, dx(tuple(tags.values())))
 
