@@ -89,6 +89,9 @@ def test_types_are_part_of_the_package() -> None:
     assert "fxcrack_command" in tools["packages"]
 
 
+EDITED = "site-packages" not in fxcrack.__file__ and "dist-packages" not in fxcrack.__file__
+
+
 @pytest.mark.slow
 def test_mypy_checks_a_script_of_a_user(tmp_path: Path) -> None:
     pytest.importorskip("mypy")
@@ -101,6 +104,8 @@ def test_mypy_checks_a_script_of_a_user(tmp_path: Path) -> None:
         text=True,
         check=False,
         cwd=tmp_path,
+        # an installation for editing is known to Python only, not to mypy
+        env={**os.environ, "MYPYPATH": str(Path(fxcrack.__file__).parents[1])} if EDITED else None,
     )
     assert "mine.py:4: error: Incompatible types in assignment" in done.stdout
     assert "py.typed" not in done.stdout and done.stdout.count("error:") == 1

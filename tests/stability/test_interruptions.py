@@ -217,7 +217,7 @@ def test_a_signal_inside_a_long_computation_ends_all_ranks(tmp_path: Path) -> No
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("every", "room", "file"), [(1, 45_000, "state.npz"), (100_000, 9_000, "history.csv")]
+    ("every", "room", "file"), [(1, 25_000, "state.npz"), (100_000, 9_000, "history.csv")]
 )
 def test_a_full_disk_ends_all_ranks_and_leaves_what_was_there(
     every: int, room: int, file: str, tmp_path: Path, undisturbed: list[dict[str, str]]
