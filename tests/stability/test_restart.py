@@ -221,7 +221,7 @@ RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | 
     ),
     "plastic": (
         yielding,
-        [fx.Static(until=fx.Time(3.0), initial=0.2, maximum=0.2, **INCREMENTS)],
+        [fx.Static(until=fx.Time(1.6), initial=0.1, maximum=0.1, **INCREMENTS)],
     ),
     "plastic, short": (
         yielding,
