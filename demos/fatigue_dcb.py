@@ -10,10 +10,8 @@
 #
 #     N(a) = N0 + (ae^(4m+1) - ae0^(4m+1))/(C ((1 - R^2) G0)^m ae0^(4m) (4m+1)),   C, m of growth.
 #
-# N goes with G^10.6: one per cent in G is eleven in N, and an element of length d counts with its G
-# at one end 43 d/(2 ae) too much or too little. `method="closure"`, the energy of releasing a node,
-# is the mean of G over the element instead (in 2-D, where one node is the whole front): the sum
-# over elements becomes a midpoint rule.
+# N goes with G^10.6: one per cent in G is eleven in N. The cycles of an element are therefore the
+# integral of its Paris law between G at its beginning and G at its end, log-linear in between.
 #
 # A cycle costs two small dense equilibria, and one is solved per release: millions of cycles take a
 # second, on one factorisation.

@@ -1,1 +1,1 @@
-"""Solvers of a scene: linear condensed bodies, nonlinear bodies by Newton's method."""
+"""Solvers of a scene: linear condensed, nonlinear by Newton's method, explicit dynamics."""
