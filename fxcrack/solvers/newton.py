@@ -157,6 +157,8 @@ class NewtonSolver(InterfaceSolver):
         )
         self.timings.add("transform", start)
         self.bodies.set(self.u)
+        if not self.bodies.dynamic:  # inertia holds every body
+            tangent.restraint = self.restraint(roles, coordinates)
         if self._resumed_origin is not None:
             self._condense_again(coordinates, *self._resumed_origin)
             self._resumed_origin = None
@@ -166,6 +168,7 @@ class NewtonSolver(InterfaceSolver):
             tangent.condensation.schur, coordinates.n_retained, self.n_loads, n_forces,
             offset=np.zeros(coordinates.n_last),
         )  # fmt: skip
+        system.cholesky.restraint = tangent.restraint
         residual = tangent.out_of_balance(loads)
         jump = self.interfaces.jumps(self.u, coordinates)
         tangent.anchor(system, residual, jump, loads).destroy()
