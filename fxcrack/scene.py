@@ -461,6 +461,8 @@ class Scene:
                 restarts.put_in_equilibrium()
             return
         solver = analysis.condensed
+        if not (restarts.resumes or analysis.started) and isinstance(step, Static):
+            solver.begin_motion(step.initial)
         solver.prepare(may_grow, self._reach(step))
         if restarts.resumes:
             restarts.put_in_equilibrium()

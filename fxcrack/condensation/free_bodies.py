@@ -72,22 +72,22 @@ class FreeBodies:
         frames: Sequence[Array],
     ) -> None:
         self._continuum = continuum
-        self._given = supports, list(pairs), list(bonded), list(index), list(frames)
+        self._given_supports = supports
+        self._given_jumps = list(pairs), list(bonded), list(index), list(frames)
         self._known: dict[bytes, str] = {}
         self.warned = False
 
     def _prepare(self) -> None:
         """Make the equations."""
         continuum = self._continuum
-        supports, *jumps = self._given
         self._bodies = bodies = Bodies(continuum)
         motions = motions_of(continuum, bodies.of_node, bodies.centre, bodies.size)
         self._m = motions.shape[1]
         self._n = self._m * bodies.count
         far = float((bodies.far / bodies.size).max(initial=0.0))
         self._unseen = max(_UNSEEN, 64.0 * np.finfo(float).eps * far)
-        self._supported = self._at_supports(motions, supports)
-        rows, numbers = self._at_jumps(motions, *jumps)
+        self._supported = self._at_supports(motions, self._given_supports)
+        rows, numbers = self._at_jumps(motions, *self._given_jumps)
         self._fixed = rows[np.flatnonzero(numbers < 0)]
         order = np.flatnonzero(numbers >= 0)
         self._retained, self._numbers = rows[order], numbers[order]

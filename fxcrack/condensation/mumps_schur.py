@@ -250,12 +250,14 @@ def check_factor(
     code = infog(1)
     if code < 0 and code not in SINGULAR:
         raise SolverError(mumps_message(code, infog(2)))
-    n_negative, smallest, largest = infog(12), rinfog(19), rinfog(21)  # pivots; 0 if not told
-    wrong = code < 0 or (definite and n_negative > 0)
-    if not wrong and (smallest >= _SMALLEST_PIVOT * largest):
-        return
+    ratio = 0.0
+    if code >= 0 and not (definite and infog(12) > 0):
+        smallest, largest = rinfog(19), rinfog(21)  # pivots; 0 if not told
+        if smallest >= _SMALLEST_PIVOT * largest:
+            return
+        ratio = smallest / largest
     if doubt is not None:
-        doubt(0.0 if wrong else smallest / largest)
+        doubt(ratio)
     if code < 0 or (doubt is None and definite):
         raise SolverError(mumps_message(-10, 0))
 

@@ -146,6 +146,9 @@ class InterfaceSolver(ABC):
             force: Its given forces, shape (n_retained,).
         """
 
+    def begin_motion(self, dt: float) -> None:  # noqa: B027 - bodies at rest have nothing to do
+        """See :meth:`fxcrack.solvers.base.Solver.begin_motion`."""
+
     @abstractmethod
     def start(self) -> None:
         """Find the equilibrium without loads; collective."""

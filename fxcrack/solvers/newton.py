@@ -26,6 +26,7 @@ from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.can_fly import can_fly
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
 from fxcrack.solvers.increment_work import FINE, EnergyImbalance, IncrementWork, TrialIncrement
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
@@ -102,6 +103,7 @@ class NewtonSolver(InterfaceSolver):
         pairing: Energy that new pairings of faces that slide have taken.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
+        free_start: Whether the motion began without an equilibrium, see :meth:`begin_motion`.
     """
 
     def __init__(
@@ -136,7 +138,7 @@ class NewtonSolver(InterfaceSolver):
         self.largest_force = self.largest_energy = 0.0
         self._most_stored = 0.0  # in any accepted state: what is left of it is round-off
         self.pairing = PairingEnergy()
-        self.exact = False
+        self.exact = self.free_start = False
         self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: TrialIncrement | None = None
@@ -233,11 +235,27 @@ class NewtonSolver(InterfaceSolver):
 
     # -- trials --------------------------------------------------------------------------
 
+    def begin_motion(self, dt: float) -> None:
+        """Let bodies with inertia that nothing holds begin without an equilibrium; collective.
+
+        Before an increment of time the tangent holds no inertia, so that it is singular where a
+        body can move freely. There is then no equilibrium to begin with, and loads that are there
+        from the first moment are applied within the first increment.
+
+        Args:
+            dt: Length of the first increment, time.
+        """
+        inertia = self.bodies.inertia
+        if inertia is not None and can_fly(self.continuum, self.supports, self.pairs, self.fronts):
+            self.free_start = True
+            inertia.expect(dt)
+
     def start(self) -> None:
         """Find the equilibrium without loads; collective."""
         zero = np.zeros(self.system.n_retained)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
-        self._solve(zero)
+        if not self.free_start:
+            self._solve(zero)
 
     def _solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""

@@ -135,6 +135,8 @@ class StepDriver:
     def _apply_loads(self) -> None:
         """Apply loads that are there from the first moment of the step, in proportion."""
         analysis = self.analysis
+        if isinstance(analysis.solver, NewtonSolver) and analysis.solver.free_start:
+            return  # the first increment applies them
         wanted, present = analysis.loads_at(analysis.time), analysis.solver.state.loads
         if np.abs(wanted - present).max(initial=0.0) > 1e-12 * np.abs(wanted).max(initial=0.0):
             self.path.over_increment(analysis.time)
