@@ -62,7 +62,7 @@ class Bodies:
         whole = sp.coo_matrix((np.ones(len(a)), (a, b)), shape=(total, total))
         _, group = connected_components(whole, directed=False)
         used = np.unique(np.concatenate(comm.allgather(np.unique(group[label]))))
-        return np.searchsorted(used, group[label])
+        return np.asarray(np.searchsorted(used, group[label]))
 
     def names(self) -> list[str]:
         """What to call each body: the cell groups that make it up, or where it is; collective."""
