@@ -170,8 +170,8 @@ class ShellCells:
         lost = _LOST * (length / self.thickness) ** 4
         if lost > _TOO_MUCH_LOST:
             log.warn(
-                "ContinuumShell of '%s': its length %.4g is %.4g times its thickness %.4g; rounding "
-                "changes its bending stiffness by about %.1g of itself. Model a shorter part, or "
+                "ContinuumShell of '%s': its length %.4g is %.4g times its thickness %.4g; "
+                "rounding changes its bending stiffness by about %.1g of itself. Model a shorter part, or "
                 "use fx.Shell on the surface, whose unknowns do not lose these digits",
                 self.name,
                 length,
