@@ -171,8 +171,8 @@ class ShellCells:
         if lost > _TOO_MUCH_LOST:
             log.warn(
                 "ContinuumShell of '%s': its length %.4g is %.4g times its thickness %.4g; "
-                "rounding changes its bending stiffness by about %.1g of itself. Model a shorter part, or "
-                "use fx.Shell on the surface, whose unknowns do not lose these digits",
+                "rounding changes its bending stiffness by about %.1g of itself. "
+                "Model a shorter part, or use fx.Shell on the surface, whose unknowns do not lose these digits",
                 self.name,
                 length,
                 length / self.thickness,
