@@ -172,7 +172,8 @@ class ShellCells:
             log.warn(
                 "ContinuumShell of '%s': its length %.4g is %.4g times its thickness %.4g; "
                 "rounding changes its bending stiffness by about %.1g of itself. "
-                "Model a shorter part, or use fx.Shell on the surface, whose unknowns do not lose these digits",
+                "Model a shorter part, or use fx.Shell on the surface, whose unknowns do not "
+                "lose these digits",
                 self.name,
                 length,
                 length / self.thickness,
