@@ -161,9 +161,16 @@ def _rates(title: str, criterion: RateCriterion, nodal: bool) -> tuple[str, list
     given: list[object] = _filled(toughness) if not nodal else [0.0, 0.0, 0.0]
     if isinstance(criterion, Fatigue):
         p = criterion.paris
+        limits = () if p is None else (p.r1, p.r2)
+        constant = [r for r in limits if isinstance(r, float)]
+        if p is None or p.drive != "dG" or p.normalised or len(constant) < 2:
+            raise InputError(
+                f"write_deck: interface '{title}': a deck has words for a Paris law in dG with "
+                "constant threshold and upper limit only"
+            )
         if criterion.credit:
             raise InputError(f"write_deck: interface '{title}': credit=True has no word in a deck")
-        paris = [p.c1, p.c2, p.c3, p.c4, p.r1, p.r2]
+        paris = [p.c1, p.c2, p.c3, p.c4, *constant]
         rows = [[*paris, *row, *exponents, *t] for row, t in _against_temperature(given)]
         return f"TYPE=FATIGUE, {head}", _in_eights(rows)
     assert isinstance(criterion, VCCT)
