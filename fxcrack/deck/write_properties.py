@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.materials import Isotropic, Material, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.criteria import (
@@ -34,12 +35,15 @@ def _row(values: list[float]) -> str:
 # -- materials -------------------------------------------------------------------------------------
 
 
-def material_lines(title: str, material: Material) -> tuple[list[str], list[str]]:
+def material_lines(
+    title: str, material: Material, inertia: Inertia | None = None
+) -> tuple[list[str], list[str]]:
     """Lines of a material, and of its orientation if it has one.
 
     Args:
         title: Name of both.
         material: The material.
+        inertia: Density of all bodies and damping, in a scene whose bodies move.
 
     Raises:
         InputError: A deck has no word for it.
@@ -82,6 +86,11 @@ def material_lines(title: str, material: Material) -> tuple[list[str], list[str]
     else:
         raise InputError(f"write_deck: material {material}: a deck has no word for it")
     density = getattr(material, "density", None)
+    if inertia is not None:
+        density = density if inertia.density is None else inertia.density
+        by_mass, by_stiffness = inertia.rayleigh
+        if by_mass or by_stiffness:
+            out.append(f"*DAMPING, ALPHA={number(by_mass)}, BETA={number(by_stiffness)}")
     if density is not None:
         out += ["*DENSITY", number(density)]
     if any(np.any(m.expansion) for _, m in tables):  # type: ignore[attr-defined]
