@@ -213,9 +213,13 @@ def test_web_bent_in_its_plane() -> None:
     assert s.solve()[end, 1].mean() == pytest.approx(0.998 * beam, rel=2e-3)
 
 
-@pytest.mark.parametrize("slenderness", [10, 100, 1000])
-def test_thin_strips(slenderness: int) -> None:
-    """Cantilever of 8 cells against beam theory, at any thickness."""
+@pytest.mark.parametrize(("slenderness", "tolerance"), [(10, 2e-3), (300, 2e-3), (1000, 2e-2)])
+def test_thin_strips(slenderness: int, tolerance: float, caplog: pytest.LogCaptureFixture) -> None:
+    """Cantilever of 8 cells against beam theory, at any thickness.
+
+    At 1000 the rounding of the stiffness, which differs from processor to processor, is about
+    10 eps 1000^4 = 2e-3, and the tolerance ten times that: a strip that locks is off by far more.
+    """
     e, t = 70e3, 10.0 / slenderness
     s = Solution(shell(thin_body((8, 1), (10.0, 1.0), t), fx.Isotropic(e, 0.0)))
     s.fix(s.on("a0"), (0, 1, 2))
@@ -225,7 +229,8 @@ def test_thin_strips(slenderness: int) -> None:
         weight *= np.where(np.isclose(s.x[end, k], middle), 4.0, 1.0)
     s.force[end, 2] = weight / weight.sum()
     beam = 10.0**3 / (3 * e * t**3 / 12) + 10.0 / (5 / 6 * e / 2 * t)
-    assert s.solve()[end, 2].mean() == pytest.approx(beam, rel=2e-3)
+    assert s.solve()[end, 2].mean() == pytest.approx(beam, rel=tolerance)
+    assert ("rounding changes its bending stiffness" in caplog.text) == (slenderness == 1000)
 
 
 # -- laminates -------------------------------------------------------------------------------------

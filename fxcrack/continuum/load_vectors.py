@@ -24,6 +24,7 @@ from fxcrack.continuum.loads import (
     Field,
     Load,
     Moment,
+    Monitor,
     PointForce,
     PointMoment,
     Pressure,
@@ -99,6 +100,26 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
     vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def monitor_weights(continuum: Continuum, monitor: Monitor) -> Array:
+    """Weights of the owned dofs in a monitored value, shape (n_local,); collective.
+
+    Raises:
+        InputError: The direction has another number of components, or the group does not fit.
+    """
+    out = np.zeros(continuum.n_local)
+    for term in monitor.terms:
+        if len(term.direction) != continuum.gdim:
+            raise InputError(
+                f"Monitor('{term.title}'): direction has {len(term.direction)} components, "
+                f"{continuum.gdim} are needed"
+            )
+        nodes = continuum.owned_nodes(term.where)
+        count = continuum.comm.allreduce(len(nodes))
+        for i, component in enumerate(term.direction):
+            out[continuum.layout.dof(nodes, i)] += component / count
+    return out
 
 
 def _check_components(continuum: Continuum, value: tuple[Field, ...], title: str) -> None:
