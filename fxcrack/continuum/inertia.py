@@ -161,6 +161,12 @@ class InertiaForces(Term):
     def __init__(self, continuum: Continuum, effect: Inertia) -> None:
         if effect.lumped and continuum.order != 1:
             raise InputError("Inertia: lumped mass exists for first-order bodies only (order=1)")
+        if effect.rayleigh[1] and continuum.tied_cells:
+            raise InputError(
+                f"Inertia: rayleigh = {effect.rayleigh}: damping by stiffness is not available "
+                "with first-order continuum shells; use damping by mass, rayleigh=(r, 0.0), or "
+                "Scene(order=2)"
+            )
         self._continuum = continuum
         self._effect = effect
         domain = continuum.mesh.domain
