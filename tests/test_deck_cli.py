@@ -108,7 +108,7 @@ OTHERS = {
     "hertz_cax4": "have a node more than once",
     "necking_cax4rt": "CAX4RT is refused: temperatures",
     "plastic_cpe4": "plasticity is for small strain and cannot stand beside NLGEOM=YES",
-    "plate_s4r": "S4R is refused: shells",
+    "plate_s4r": "*MASS is refused: point masses",
     "preform_shear": "*DAMAGE INITIATION is refused",
     "two_instances": "*PLASTIC: the parameter PROPERTIES is not available",
 }

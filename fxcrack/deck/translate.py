@@ -13,7 +13,6 @@ from fxcrack.continuum.materials import Plastic
 from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
 from fxcrack.deck.constraints import read_links
 from fxcrack.deck.contact import Contacts
-from fxcrack.deck.explicit_rules import check_density, check_explicit
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
@@ -22,6 +21,8 @@ from fxcrack.deck.model import Family, Model
 from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
 from fxcrack.deck.properties import Sections, read_sections
 from fxcrack.deck.report import Report
+from fxcrack.deck.rules import check_density, check_explicit, check_shells, density_of
+from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
 from fxcrack.deck.tracks import Amplitudes
@@ -78,6 +79,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     if any(block.kind.stacked for space in spaces for block in space.elements.values()):
         order = 2
     flat = Flat(model, order)
+    if flat.kind.shell:
+        check_normals(flat)
     groups = Groups(flat)
     cards = _model_cards(flat)
     procedures = read_procedures(model.steps, report)
@@ -107,6 +110,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         steps.append(DeckStep(family.name, procedure.step, tuple(grow)))
     sections = read_sections(flat, groups, report)
     _check_finite(finite, sections, model)
+    if flat.kind.shell:
+        check_shells(procedures, loads, temperatures)
     moving = [p for p in procedures if p.inertia is not None]
     if moving:
         check_density(moving[0], sections, model)
@@ -123,7 +128,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     if explicit:
         grow = [d.interface.title for d in debonds]
         steps = [DeckStep(s.name, s.step, tuple(grow)) for s in steps]
-    densities = {n: getattr(m, "density", None) for n, m in sections.materials.items()}
+    densities = {n: density_of(m) for n, m in sections.materials.items()}
     arguments: dict[str, Any] = {
         "materials": sections.materials,
         "model": sections.model,
