@@ -65,6 +65,7 @@ from fxcrack.history import History
 from fxcrack.interface.pairing import Interface
 from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
+from fxcrack.output.front_line import FrontLine, front_lines
 from fxcrack.output.plies import PlyResults, ply_results
 from fxcrack.output.tables import (
     BondHistory,
@@ -151,6 +152,7 @@ __all__ = [
     "FatigueLaw",
     "FieldSeries",
     "FiniteStrain",
+    "FrontLine",
     "FxcrackError",
     "History",
     "Inertia",
@@ -202,6 +204,7 @@ __all__ = [
     "checkpoints",
     "displacement_function",
     "from_dolfinx",
+    "front_lines",
     "mesh_from_gmsh",
     "ply_results",
     "read_deck",

@@ -491,7 +491,12 @@ class _Writer:
 
     def _monitor(self, monitor: Monitor) -> list[str]:
         axes = np.flatnonzero(monitor.direction)
-        if len(axes) != 1 or self.mesh is None or self.mesh.groups[monitor.where][0] != 0:
+        if (
+            monitor.plus
+            or len(axes) != 1
+            or self.mesh is None
+            or self.mesh.groups[monitor.where][0] != 0
+        ):
             return []
         return [f'*NODE OUTPUT, NSET="{monitor.where}"', f"U{axes[0] + 1}"]
 

@@ -132,6 +132,11 @@ def criterion_lines(title: str, criterion: Criterion, nodal: bool) -> list[str]:
             lines = [_row([row[0], 0.0, *t]) for row, t in _against_temperature(
                 [criterion.critical])]  # fmt: skip
     elif isinstance(criterion, CrackLengthVsTime):
+        if criterion.direction is not None:
+            raise InputError(
+                f"write_deck: interface '{title}': direction={criterion.direction} has no word in "
+                "a deck: lengths are measured from the reference point itself there"
+            )
         head = f'TYPE=CRACK LENGTH, NSET="{criterion.reference}", {tolerance}'
         pairs = zip(criterion.times, criterion.lengths, strict=True)
         lines = [_row([t, x]) for t, x in pairs]
