@@ -86,12 +86,6 @@ _REFUSED = (
 """Patterns of element types that are refused, with what would help: the one place to look."""
 
 
-_STACKED = (
-    "the continuum shell is replaced by one of second order with 27 nodes; all elements of the "
-    "deck are raised to the second order"
-)
-
-
 @dataclass(frozen=True)
 class ElementType:
     """An element type of a deck.
@@ -142,7 +136,7 @@ def element_type(name: str) -> ElementType | str:
         name: In capitals, e.g. "C3D20R".
     """
     if name in ("SC8", "SC8R"):
-        return ElementType(name, "hexahedron", 1, "solid", 8, (_STACKED,), stacked=True)
+        return ElementType(name, "hexahedron", 1, "solid", 8, stacked=True)
     shell = re.fullmatch(r"S([348])(R?)(5?)(S?W?)", name)
     if shell or name == "STRI3":
         cell, order = _SHELLS[shell[1] if shell else "3"]

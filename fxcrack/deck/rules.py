@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.materials import Material, Plastic
 from fxcrack.continuum.section import Section
 from fxcrack.deck.flat import Flat
@@ -82,12 +81,6 @@ def check_explicit(
         DeckError: Says which, and what to do instead.
     """
     card = procedure.card
-    if any(isinstance(m, ContinuumShell) for m in sections.materials.values()):
-        card.fail(
-            "continuum shells are elements of the second order here, and explicit dynamics needs "
-            "the first; mesh the part with solids (C3D8 and *SOLID SECTION), or take implicit "
-            "*DYNAMIC"
-        )
     if flat.kind.order != 1:
         card.fail(
             f"{flat.given_kind.name} elements of the second order are not possible in explicit "

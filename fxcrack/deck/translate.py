@@ -75,16 +75,13 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     Raises:
         DeckError: Something is missing, contradicts itself or has no word here.
     """
-    spaces = [model.root, *model.instances.values()]
-    if any(block.kind.stacked for space in spaces for block in space.elements.values()):
-        order = 2
-    flat = Flat(model, order)
+    procedures = read_procedures(model.steps, report)
+    explicit = bool(procedures) and isinstance(procedures[0].step, Explicit)
+    flat = Flat(model, _order(model, report, order, explicit=explicit))
     if flat.kind.shell:
         check_normals(flat)
     groups = Groups(flat)
     cards = _model_cards(flat)
-    procedures = read_procedures(model.steps, report)
-    explicit = bool(procedures) and isinstance(procedures[0].step, Explicit)
     _check_steps(model.steps, explicit=explicit)
     finite = _finite(model.steps, procedures, report)
     periods = [p.period for p in procedures]
@@ -148,6 +145,27 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     raw = groups.raw_mesh()
     _tell(report, flat, arguments, steps)
     return Translated(arguments, steps, report, raw)
+
+
+def _order(model: Model, report: Report, order: int | None, *, explicit: bool) -> int | None:
+    """Order of the elements: where there are continuum shells, 2 unless another is asked for."""
+    spaces = [model.root, *model.instances.values()]
+    blocks = [block for space in spaces for block in space.elements.values() if block.kind.stacked]
+    if not blocks or order is not None:
+        return order
+    if explicit:
+        report.replace(
+            "the continuum shell is replaced by one of first order with tied and enhanced strains "
+            "and full integration",
+            blocks[0].card,
+        )
+        return None
+    report.replace(
+        "the continuum shell is replaced by one of second order with 27 nodes; all elements of the "
+        "deck are raised to the second order (read_deck(..., order=1) or --order 1: 8 nodes)",
+        blocks[0].card,
+    )
+    return 2
 
 
 def _model_cards(flat: Flat) -> list[Card]:
