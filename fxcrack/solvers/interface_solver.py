@@ -275,7 +275,7 @@ class InterfaceSolver(ABC):
             self._cost,
             around=self.around,
             keep=state.nodes_to_retain(self.pairs),
-            cap_mb=self.options.window_mb,
+            cap_mb=self.options.retained_mb,
             gdim=self.continuum.gdim,
         )
 
