@@ -135,7 +135,7 @@ def yielding(comm: MPI.Intracomm) -> fx.Scene:
 
 RUNS: dict[str, tuple[Callable[[MPI.Intracomm], fx.Scene], Sequence[fx.Static | fx.Cycles]]] = {
     "event": (short, [fx.Static(until=fx.Releases(10))]),
-    "event, contact, small windows": (
+    "event, contact, small retained sets": (
         lambda comm: short(comm, contact=True, options=fx.CondensedOptions(rows=2.0)),
         [fx.Static(until=fx.Releases(10))],
     ),
