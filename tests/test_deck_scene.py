@@ -429,8 +429,11 @@ def test_dynamic_steps(tmp_path):
         ("*STEP\n*DIRECT CYCLIC\n0.1, 1.\n*END STEP\n", "available with FATIGUE only"),
         ("*STEP\n*FATIGUE\n0.1\n*END STEP\n", "the time of one cycle is missing"),
         ("*STATIC\n1., 1.\n", r"it belongs into a \*STEP"),
-        ("*SHELL SECTION, ELSET=PLATE, MATERIAL=STEEL\n1.\n", "needs continuum shell elements"),
-        ("*SHELL GENERAL SECTION, ELSET=PLATE\n1.\n", "SECTION is refused: these shells"),
+        ("*SHELL SECTION, ELSET=PLATE, MATERIAL=STEEL\n1.\n", "needs shell elements"),
+        (
+            "*SHELL GENERAL SECTION, ELSET=PLATE\n1.\n",
+            "SECTION is refused: it is not",
+        ),
         ("*BOUNDRY\nLEFT, 1\n", r"did you mean \*BOUNDARY"),
         ("*BOUNDARY, AMPLITUD=A\nLEFT, 1\n", "there is no amplitude 'A'"),
         ("*BOUNDARY, WEIGHT=A\nLEFT, 1\n", "the parameter WEIGHT is not available"),

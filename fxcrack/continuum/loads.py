@@ -259,7 +259,7 @@ def _components(owner: str, value: Any, *, functions: bool = True) -> Any:
     for i, entry in enumerate(entries):
         found = as_float(entry)
         if found is not None and not np.isfinite(found):
-            raise InputError(f"{owner} is not a finite number: value[{i}] = {entry}; mend it")
+            raise InputError(f"{owner} is not a finite number: value[{i}] = {entry}; correct it")
         if functions or not is_function(entry):
             number_or_function(owner, f"value[{i}]", entry)
         else:

@@ -104,7 +104,8 @@ def _rigid(card: Card, flat: Flat) -> list[Link]:
         card.fail("give ELSET, TIE NSET or PIN NSET; rigid surfaces are not available")
     nodes = flat.with_centres(np.unique(np.concatenate(parts)))
     name = card.text(names[0])
-    return _rigid_motion(card, name, nodes, set(range(6)), _reference(card, flat), flat)
+    dofs = set(range(3 if names == ["PIN NSET"] else 6))
+    return _rigid_motion(card, name, nodes, dofs, _reference(card, flat), flat)
 
 
 def _rigid_motion(
@@ -126,4 +127,6 @@ def _rigid_motion(
             if np.abs(arm).max(initial=0.0) > 0.0 and (gdim == 3 or of_dof == 5):
                 terms.append((reference, of_dof, arm if len(arm) else none))
         links.append(Link(card, name, nodes, dof, terms))
+    if flat.kind.shell:
+        links += [Link(card, name, nodes, d, [(reference, d, one)]) for d in sorted(dofs) if d >= 3]
     return links

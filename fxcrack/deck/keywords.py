@@ -55,8 +55,8 @@ _READ = {
     # sections, materials
     "SOLID SECTION": ("ELSET, MATERIAL, ORIENTATION", "CONTROLS"),
     "SHELL SECTION": (
-        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON",
-        "CONTROLS",
+        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON, OFFSET, SYMMETRIC",
+        "CONTROLS, SECTION INTEGRATION, LAYUP",
     ),
     "ORIENTATION": ("NAME, SYSTEM, DEFINITION", ""),
     "MATERIAL": ("NAME", "SRANGE, RTOL"),
@@ -144,7 +144,9 @@ _OUTPUT = (
 
 _NUMERICS = "CONTACT CONTROLS, SECTION CONTROLS, HOURGLASS STIFFNESS, SOLVER CONTROLS"
 
-_SHELLS = "these shells are not available; use continuum shells (SC8R) or solid elements (C3D20R)"
+_SHELLS = (
+    "it is not available; shells (S4R, S8R, SC8R) have *SHELL SECTION with a thickness or plies"
+)
 _USER = (
     "user subroutines cannot be run; use a material that fxcrack has (ELASTIC, PLASTIC, "
     "HYPERELASTIC with NEO HOOKE)"

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
     AmplitudeLike,
     BodyForce,
     Load,
     PointForce,
+    PointMoment,
     Pressure,
     Traction,
 )
@@ -146,9 +148,12 @@ class Loads:
         if word in ("P", "HP") or (word[:1] == "P" and word[1:].isdigit()) or (
             word[:2] == "HP" and word[2:].isdigit()
         ):  # fmt: skip
-            if card.keyword == "DLOAD" and word in ("P", "HP"):
-                row.fail("load type P needs the face of solid elements: P1, P2, ...")
-            entry.follows = self._finite
+            if card.keyword == "DLOAD" and (word in ("P", "HP")) != self._flat.kind.shell:
+                row.fail(
+                    "load type P needs the face of solid elements: P1, P2, ...; shells have P and "
+                    "HP alone"
+                )
+            entry.follows = self._finite and not (self._flat.kind.shell and follower == "NO")
             if word[:2] == "HP":
                 entry.zero = (row.number(3), row.number(4))
                 if entry.zero[0] == entry.zero[1]:
@@ -178,7 +183,7 @@ class Loads:
         if row.card.has("FOLLOWER"):
             row.fail("forces that turn with the body are not available")
         dof = row.whole(1)
-        if not 1 <= dof <= self._flat.kind.gdim:
+        if not 1 <= dof <= (6 if self._flat.kind.shell else self._flat.kind.gdim):
             row.fail(
                 f"component {dof} of a force is not available on {self._flat.kind.name} elements, "
                 f"whose nodes have {self._flat.kind.gdim} displacements and no rotations"
@@ -230,7 +235,7 @@ class Loads:
             if entry.kind == "CLOAD" and not entry.track.zero:
                 value, amplitude = entry.track.amplitude()
                 mark = (entry.name, repr(amplitude))
-                zero = np.zeros(self._flat.kind.gdim)
+                zero = np.zeros(6 if self._flat.kind.shell else self._flat.kind.gdim)
                 force = found.setdefault(mark, (entry, amplitude, zero))[2]
                 force[int(entry.type) - 1] += value
         out: list[Load] = []
@@ -238,10 +243,15 @@ class Loads:
             nodes = self._flat.nodes(entry.row.card, name, entry.row.index)
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
+            moment, force = force[self._flat.kind.gdim :], force[: self._flat.kind.gdim]
             axes = "".join("xyz"[i] for i in np.flatnonzero(force))
             title = name if alone else f"{name}.{axes}"
-            total = tuple((force * len(nodes)).tolist())
-            out.append(PointForce(where, total, amplitude, title))
+            if axes:
+                total = tuple((force * len(nodes)).tolist())
+                out.append(PointForce(where, total, amplitude, title))
+            if moment.any():
+                total = tuple((moment * len(nodes)).tolist())
+                out.append(PointMoment(where, total, amplitude, f"{title}.moment"))
         return out
 
     def _of(
@@ -262,13 +272,20 @@ class Loads:
             return new
 
         if entry.kind == "DSLOAD":
-            where = groups.facets(entry.name, flat.surface(card, entry.name, entry.row.index))
+            where = groups.surface(card, entry.name, entry.row.index)
+            if entry.type == "TRVEC" and flat.kind.shell:
+                self._report.replace(
+                    "the traction acts on the face of the shell, not on its reference surface", card
+                )
             return [self._on_facets(entry, where, value, amplitude, title(entry.name))]
         cells = (
             flat.elements(card, entry.name, entry.row.index)
             if entry.name
             else np.arange(len(flat.cells))
         )
+        if entry.type in ("P", "HP"):  # of shells: towards the positive side
+            side = Face(groups.cells(entry.name or "all shells", cells), "bottom")
+            return [self._on_facets(entry, side, value, amplitude, title(entry.name or "P"))]
         if entry.type.lstrip("H")[:1] == "P":
             face = int(entry.type.lstrip("HP"))
             rows = flat.faces(card, cells, face, entry.row.index)
@@ -291,14 +308,14 @@ class Loads:
         return [BodyForce(tuple(force.tolist()), body, amplitude, title(f"{name}.{entry.type}"))]
 
     def _on_facets(
-        self, entry: LoadEntry, where: str, value: float, amplitude: AmplitudeLike, name: str
+        self, entry: LoadEntry, where: str | Face, value: float, amplitude: AmplitudeLike, name: str
     ) -> Load:
         if entry.type == "TRVEC":
             traction = tuple(value * d for d in entry.direction[: self._flat.kind.gdim])
             return Traction(where, traction, amplitude, name)
         if entry.type[:2] == "HP":
             # from the level where it is 0 to that where it has its value
-            axis = self._flat.kind.gdim - 1
+            axis = 1 if self._flat.kind.gdim == 2 else 2
             shape = Hydrostatic(axis, *entry.zero)
             field = _Scaled(value, shape)
             return Pressure(where, field, amplitude, name, entry.follows)

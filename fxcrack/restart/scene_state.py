@@ -111,7 +111,7 @@ def apply_after_condensation(analysis: Analysis, saved: Saved) -> None:
     if not np.allclose(before, now, rtol=_SAME, atol=_SAME * np.abs(before).max(initial=0.0)):
         raise InputError(
             f"the checkpoint does not fit: at time {analysis.time:g} amplitudes and load factors "
-            f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or mend the "
+            f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or correct the "
             "scene"
         )
     _check_jumps(analysis, saved.arrays)
@@ -214,7 +214,7 @@ def _check_jumps(analysis: Analysis, arrays: Arrays) -> None:
         raise InputError(
             f"the checkpoint does not fit: jumps differ by {off / size:.1e} of the largest one "
             "from the equilibrium of this scene; bodies or loads are others than when it was "
-            "written (a function of position, perhaps). Run without restart, or mend the scene"
+            "written (a function of position, perhaps). Run without restart, or correct the scene"
         )
 
 

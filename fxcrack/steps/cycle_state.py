@@ -56,7 +56,7 @@ class FatigueState:
         default_factory=lambda: {name: [] for name in _COLUMNS}
     )
 
-    def meet(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
+    def register_front(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
         """Register a front; the nodes of the first one on a pair wait for onset.
 
         Args:

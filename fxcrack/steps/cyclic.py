@@ -189,7 +189,7 @@ class _Cycling:
             self._begin_at(top)
         self._load_to(path, self._corners[0][0])
         for g, v in analysis.at_tips():
-            analysis.fatigue.meet(g.p, v.tips.node, g.front.surface.n_nodes)
+            analysis.fatigue.register_front(g.p, v.tips.node, g.front.surface.n_nodes)
         return top
 
     def _begin_at(self, top: int) -> None:
