@@ -381,7 +381,7 @@ class InterfaceSolver(ABC):
         for bond in self.system.soft.bonds:
             pair, members, _ = bond.where
             if pair == p:
-                left = bond.force(bond.opening(self.state.jump)) / bond.strength
+                left = bond.remaining(bond.opening(self.state.jump))
                 nodes.append(members)
                 fractions.append(np.full(len(members), left))
         return np.concatenate(nodes), np.concatenate(fractions)
