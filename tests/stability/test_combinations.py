@@ -18,6 +18,7 @@ pytestmark = pytest.mark.stability
 
 MANY = int(os.environ.get("FXCRACK_RANDOM_SCENES", "16"))
 FAILED = (3, 7)  # bodies with inertia at rest, contact: nothing to divide by
+OPEN = (29,)
 
 
 def check(seed: int) -> None:
@@ -26,8 +27,16 @@ def check(seed: int) -> None:
     assert not faults(c, result), (c, result.reason)
 
 
-@pytest.mark.parametrize("seed", FAILED)
+@pytest.mark.quick("4", "11")
+@pytest.mark.parametrize("seed", [4, 11, *FAILED])
 def test_found(seed: int) -> None:
+    check(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", OPEN)
+@pytest.mark.xfail(reason="finite strain, inertia and contact: faces overlap (docs/limits.md)")
+def test_known_to_fail(seed: int) -> None:
     check(seed)
 
 
