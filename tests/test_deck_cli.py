@@ -103,7 +103,7 @@ OTHERS = {
     "dcb3d_coh": "COH3D8 is refused: cohesive elements",
     "dcb3d_tie": "188 of 1026 nodes of this surface belong to no element face",
     "dcbenf_wedges": "C3D15 is refused: prisms",
-    "distributing": "*DISTRIBUTING is refused",
+    "distributing": "",
     "gaps_in_numbers": "",
     "hertz_cax4": "have a node more than once",
     "necking_cax4rt": "CAX4RT is refused: temperatures",

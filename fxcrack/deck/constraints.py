@@ -11,17 +11,22 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.deck.cards import Card, label
+from fxcrack.deck.distributing import Distributing, by_reference, distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.supports import Link
 
 
-def read_links(cards: Sequence[Card], flat: Flat) -> list[Link]:
-    """Links of all constraint cards among model data.
+def read_links(cards: Sequence[Card], flat: Flat) -> tuple[list[Link], dict[int, Distributing]]:
+    """Links of all constraint cards among model data, and couplings that distribute loads.
+
+    Returns:
+        The links, and the couplings by their reference nodes.
 
     Raises:
         DeckError: A card is not complete, or of a kind that is not available.
     """
     links: list[Link] = []
+    distributed: list[Distributing] = []
     coupling: Card | None = None
     for card in cards:
         if card.keyword == "EQUATION":
@@ -33,11 +38,16 @@ def read_links(cards: Sequence[Card], flat: Flat) -> list[Link]:
                 card.fail("it belongs directly after *COUPLING")
             links += _kinematic(coupling, card, flat)
             coupling = None
+        elif card.keyword == "DISTRIBUTING":
+            if coupling is None:
+                card.fail("it belongs directly after *COUPLING")
+            distributed.append(distributing(coupling, card, _reference(coupling, flat), flat))
+            coupling = None
         elif card.keyword == "RIGIDBODY":
             links += _rigid(card, flat)
     if coupling is not None:
-        coupling.fail("*KINEMATIC must follow; couplings that distribute loads are not available")
-    return links
+        coupling.fail("*KINEMATIC or *DISTRIBUTING must follow")
+    return links, by_reference(distributed)
 
 
 def _equations(card: Card, flat: Flat) -> list[Link]:

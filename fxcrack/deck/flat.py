@@ -407,6 +407,11 @@ class Flat:
             card, name, index
         )  # fmt: skip
 
+    def surface_is_nodes(self, card: Card, name: str) -> bool:
+        """Whether a surface is one of nodes."""
+        _, found = self._resolve(card, name, "surfaces", None)
+        return bool(found.card.word("TYPE") == "NODE")
+
     def surface_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
         """Nodes of a surface of faces or of nodes, ascending."""
         place, found = self._resolve(card, name, "surfaces", index)

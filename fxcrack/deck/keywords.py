@@ -89,6 +89,7 @@ _READ = {
     "TIE": ("NAME, ADJUST, TYPE, POSITION TOLERANCE", "NO ROTATION, NO THICKNESS"),
     "COUPLING": ("CONSTRAINT NAME, REF NODE, SURFACE", ""),
     "KINEMATIC": ("", ""),
+    "DISTRIBUTING": ("WEIGHTING METHOD", ""),
     "EQUATION": ("", ""),
     "RIGID BODY": ("REF NODE, ELSET, TIE NSET, PIN NSET, NSET", "POSITION"),
     "INITIAL CONDITIONS": ("TYPE, NORMAL", ""),
@@ -194,11 +195,7 @@ _REFUSED = {
     "DASHPOT": "dashpots are not available; use *DAMPING of the material",
     "CONNECTOR SECTION": "connectors are not available; hold or load the bodies themselves",
     "MPC": "multi-point constraints are not available; prescribe the displacements",
-    "DISTRIBUTING": (
-        "a coupling that distributes a load is not available; load the surface by *DSLOAD with "
-        "TRVEC, or use *KINEMATIC with a reference node whose motion is prescribed"
-    ),
-    "DISTRIBUTING COUPLING": "load the surface itself by *DSLOAD with TRVEC",
+    "DISTRIBUTING COUPLING": "write *COUPLING with *DISTRIBUTING",
     "KINEMATIC COUPLING": "write *COUPLING with *KINEMATIC",
     "EMBEDDED ELEMENT": "embedded elements are not available; mesh them into the body",
     "PRE-TENSION SECTION": "prescribe the displacement of the bolt's end instead",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,6 +12,7 @@ from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
     AmplitudeLike,
     BodyForce,
+    Field,
     Load,
     PointForce,
     PointMoment,
@@ -19,9 +20,11 @@ from fxcrack.continuum.loads import (
     Traction,
 )
 from fxcrack.deck.cards import Card, Row, key, label, squeeze
+from fxcrack.deck.distributing import Distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.report import Report
+from fxcrack.deck.thermal import NodalField
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track
 
 _BODY = {"BX": 0, "BY": 1, "BZ": 2}
@@ -84,13 +87,23 @@ class Loads:
         amplitudes: Its amplitudes.
         report: Takes notes.
         finite: Whether bodies turn far (NLGEOM).
+        distributed: Couplings by their reference nodes, whose loads they distribute.
     """
 
-    def __init__(self, flat: Flat, amplitudes: Amplitudes, report: Report, finite: bool) -> None:
+    def __init__(
+        self,
+        flat: Flat,
+        amplitudes: Amplitudes,
+        report: Report,
+        *,
+        finite: bool,
+        distributed: Mapping[int, Distributing],
+    ) -> None:
         self._flat = flat
         self._amplitudes = amplitudes
         self._report = report
         self._finite = finite
+        self._distributed = distributed
         self._entries: dict[tuple[str, ...], LoadEntry] = {}
         self._past: list[Period] = []
 
@@ -183,17 +196,24 @@ class Loads:
         if row.card.has("FOLLOWER"):
             row.fail("forces that turn with the body are not available")
         dof = row.whole(1)
+        nodes = self._flat.nodes(row.card, row.text(0), row.index)
+        if len(nodes) == 1 and int(nodes[0]) in self._distributed:
+            if dof not in ((1, 2, 6) if self._flat.kind.gdim == 2 else (1, 2, 3, 4, 5, 6)):
+                row.fail(f"component {dof} of a load on a reference node is not available")
+            return self._force_entry(row, dof)
         if not 1 <= dof <= (6 if self._flat.kind.shell else self._flat.kind.gdim):
             row.fail(
                 f"component {dof} of a force is not available on {self._flat.kind.name} elements, "
                 f"whose nodes have {self._flat.kind.gdim} displacements and no rotations"
             )
-        nodes = self._flat.nodes(row.card, row.text(0), row.index)
         if not self._flat.used[nodes].all():
             row.fail(
                 f"'{row.text(0)}' has a node without elements, on which no force can act; load the "
                 "nodes of the body"
             )
+        return self._force_entry(row, dof)
+
+    def _force_entry(self, row: Row, dof: int) -> tuple[tuple[str, ...], float]:
         mark = ("CLOAD", key(row.text(0)), str(dof))
         entry = LoadEntry(row, "CLOAD", label(row.text(0)), str(dof))
         self._entries.setdefault(mark, self._started(entry))
@@ -235,15 +255,19 @@ class Loads:
             if entry.kind == "CLOAD" and not entry.track.zero:
                 value, amplitude = entry.track.amplitude()
                 mark = (entry.name, repr(amplitude))
-                zero = np.zeros(6 if self._flat.kind.shell else self._flat.kind.gdim)
+                zero = np.zeros(6)
                 force = found.setdefault(mark, (entry, amplitude, zero))[2]
                 force[int(entry.type) - 1] += value
         out: list[Load] = []
         for (name, _), (entry, amplitude, force) in found.items():
             nodes = self._flat.nodes(entry.row.card, name, entry.row.index)
+            if len(nodes) == 1 and int(nodes[0]) in self._distributed:
+                coupling = self._distributed[int(nodes[0])]
+                out.append(self._distribute(coupling, entry, amplitude, force, groups))
+                continue
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
-            moment, force = force[self._flat.kind.gdim :], force[: self._flat.kind.gdim]
+            moment, force = force[3:], force[: self._flat.kind.gdim]
             axes = "".join("xyz"[i] for i in np.flatnonzero(force))
             title = name if alone else f"{name}.{axes}"
             if axes:
@@ -253,6 +277,30 @@ class Loads:
                 total = tuple((moment * len(nodes)).tolist())
                 out.append(PointMoment(where, total, amplitude, f"{title}.moment"))
         return out
+
+    def _distribute(
+        self,
+        coupling: Distributing,
+        entry: LoadEntry,
+        amplitude: AmplitudeLike,
+        load: Array,
+        groups: Groups,
+    ) -> Load:
+        """A load on the reference node as forces on the nodes of its surface."""
+        flat, gdim = self._flat, self._flat.kind.gdim
+        if self._finite and coupling.turns(load[:3], load[3:]):
+            entry.row.fail(
+                "with NLGEOM a coupling distributes forces through the centre of its surface only, "
+                "neither moments nor forces beside it; write NLGEOM=NO"
+            )
+        forces = coupling.forces(entry.row, load[:3], load[3:], gdim) * len(coupling.nodes)
+        where = groups.nodes(coupling.name, coupling.nodes, words="coupling")
+        x = flat.points[coupling.nodes][:, :gdim]
+        fields: list[Field] = []
+        for values in forces.T:
+            same = np.ptp(values) <= 1e-14 * np.abs(forces).max()
+            fields.append(float(values.mean()) if same else NodalField(x, values))
+        return PointForce(where, tuple(fields), amplitude, entry.name)
 
     def _of(
         self,

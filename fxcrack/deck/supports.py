@@ -8,7 +8,7 @@ a reference that is free or loaded is refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -17,6 +17,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.node_supports import Rotation, Support, Symmetry
 from fxcrack.deck.cards import Card, Row, label
+from fxcrack.deck.distributing import Distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track, combined
@@ -219,6 +220,21 @@ class Boundary:
         """What a component of a node does; None where it is free in some step."""
         entries = self.owner[:, dof, node].astype(np.int64)
         return None if np.any(entries < 0) or not len(entries) else self.track(entries)
+
+    def check_free(self, distributed: Mapping[int, Distributing]) -> None:
+        """Refuse prescribed motion of nodes whose loads are distributed.
+
+        Raises:
+            DeckError: There is one.
+        """
+        for node, coupling in distributed.items():
+            if np.any(self.owner[:, :, node] >= 0):
+                entry = self.entries[int(self.owner[:, :, node].max())]
+                entry.card.fail(
+                    f"'{entry.name}' is the reference of the distributing coupling "
+                    f"'{coupling.name}', whose motion cannot be prescribed; use *KINEMATIC, or "
+                    "load it by *CLOAD"
+                )
 
     # -- the scene -----------------------------------------------------------------------
 

@@ -42,6 +42,7 @@ _IN_STEPS = frozenset(
 _IN_MODEL = frozenset(
     (
         *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
+        *("DISTRIBUTING",),
         *("EQUATION", "RIGIDBODY", "CLEARANCE", "NODALENERGYRATE", "CONTROLS", *GENERAL),
     )
 )
@@ -88,7 +89,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
     boundary = Boundary(flat, periods)
     boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
-    loads = Loads(flat, amplitudes, report, finite)
+    links, distributed = read_links(cards, flat)
+    loads = Loads(flat, amplitudes, report, finite=finite, distributed=distributed)
     temperatures = Temperatures(flat, report)
     temperatures.start(_initial(cards, "TEMPERATURE"))
     contacts = Contacts(
@@ -115,7 +117,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     if explicit:
         check_explicit(moving[0], flat, sections, loads, temperatures, boundary)
     supports = boundary.displacements(groups)
-    supports += boundary.link_displacements(read_links(cards, flat), groups)
+    supports += boundary.link_displacements(links, groups)
+    boundary.check_free(distributed)
     held = np.unique(
         np.concatenate(
             [np.zeros(0, dtype=np.int64), *(n for d in range(3) for _, n in boundary.histories(d))]
