@@ -36,6 +36,7 @@ def run_deck(
     *,
     order: int | None = None,
     usual_names: bool = False,
+    report: bool = False,
 ) -> History:
     """Run all steps of a deck and write what came out; collective.
 
@@ -48,6 +49,7 @@ def run_deck(
         console: Where rank 0 prints.
         order: Order of the displacement; that of the elements by default.
         usual_names: Whether the columns of history.csv have the names of keyword programs.
+        report: Whether report.html is written as well, see :meth:`fxcrack.Scene.report`.
 
     Raises:
         DeckError: The deck is refused.
@@ -69,6 +71,8 @@ def run_deck(
         if deck.scene.debonds:
             write_tip_table(deck.scene, out / "tips.txt")
             write_releases(deck.scene, out / "releases.csv")
+        if report:
+            deck.scene.report(out / "report.html", title=path.name)
     console.print(f"files in {out}", markup=False, soft_wrap=True)
     deck.scene.close()
     return history
