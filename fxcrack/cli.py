@@ -156,6 +156,9 @@ def run(
     usual_names: Annotated[
         bool, typer.Option("--usual-names", help="Columns U1, RF1, ENRRT11, ALLSE, ...")
     ] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write report.html: pictures, energies, cost.")
+    ] = False,
 ) -> None:
     """Run a keyword deck, and write its history, fields, bonds and crack tips."""
     from fxcrack.deck.run import check_only, run_deck
@@ -164,7 +167,7 @@ def run(
         check_only(deck, rank_0_console())
         return
     folder = Path("out") / deck.stem if out is None else out
-    run_deck(deck, folder, rank_0_console(), order=order, usual_names=usual_names)
+    run_deck(deck, folder, rank_0_console(), order=order, usual_names=usual_names, report=report)
 
 
 # -- benchmarks ----------------------------------------------------------------------

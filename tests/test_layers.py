@@ -33,6 +33,8 @@ ORDER = (
 ON_USE = {
     "mesh.read -> gmsh": "only a gmsh model or file needs it, and it loads a large library",
     "history -> output.plots": "matplotlib is loaded by those who plot; the one arrow upwards",
+    "history -> pandas": "an optional library that only to_frame needs",
+    "scene -> output.report": "it loads Jinja2, an optional library, and matplotlib",
     "accuracy.scenes -> demos": "a study loads its own demo alone; one of them loads matplotlib",
     "command -> cli": "it answers --help and --version without DOLFINx",
     "cli": "its help does not wait for the libraries of its commands",

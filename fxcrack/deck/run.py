@@ -38,6 +38,7 @@ def run_deck(
     *,
     order: int | None = None,
     usual_names: bool = False,
+    report: bool = False,
 ) -> History:
     """Run all steps of a deck and write what came out; collective.
 
@@ -50,6 +51,7 @@ def run_deck(
         console: Where rank 0 prints.
         order: Order of the displacement; that of the elements by default.
         usual_names: Whether the columns of history.csv have the names of keyword programs.
+        report: Whether report.html is written as well, see :meth:`fxcrack.Scene.report`.
 
     Raises:
         DeckError: The deck is refused.
@@ -77,6 +79,8 @@ def run_deck(
                     with replacing(out / "tips.txt") as temporary:
                         temporary.write_text(tips.text, encoding="utf-8")
             write_releases(deck.scene, out / "releases.csv")
+        if report:
+            deck.scene.report(out / "report.html", title=path.name)
     console.print(f"files in {out}", markup=False, soft_wrap=True)
     deck.scene.close()
     return history
