@@ -217,6 +217,13 @@ def test_bodies_begin_with_a_velocity(tmp_path):
     deck.scene.close()
 
 
+def test_a_body_without_interfaces_flies(tmp_path):
+    text = MOVING + "*STEP, NLGEOM=NO\n*DYNAMIC, EXPLICIT\n, 0.1\n*END STEP\n"
+    deck = fx.read_deck(write(tmp_path, text))
+    assert deck.run().rows[-1]["kinetic_energy"] == pytest.approx(0.5 * 8.0 * 9.0, rel=1e-10)
+    deck.scene.close()
+
+
 def test_velocities_that_vary_and_those_that_cannot_be(tmp_path):
     step = "*STEP\n*DYNAMIC\n0.1, 1.\n*END STEP\n"
     found = read(tmp_path, MOVING.replace("ALL, 1, 3.", "LEFT, 2, 1.\nRIGHT, 2, 5.") + step)

@@ -116,8 +116,10 @@ class LumpedInterface:
         self.slave = _joined(
             [nodes.find(p.surface.dofs[j]) for p, j in zip(pairs, self.jumped, strict=True)]
         )
-        self.frames = _stacked([f[j] for f, j in zip(frames, self.jumped, strict=True)], gdim)
-        self.held = _stacked([h[j] for h, j in zip(held, self.jumped, strict=True)], gdim, bool)
+        self.frames = _stacked(
+            [f[j] for f, j in zip(frames, self.jumped, strict=True)], (gdim, gdim)
+        )
+        self.held = _stacked([h[j] for h, j in zip(held, self.jumped, strict=True)], (gdim,), bool)
         self.gap = np.concatenate(
             [np.zeros(0), *(p.gap[j] for p, j in zip(pairs, self.jumped, strict=True))]
         )
@@ -311,8 +313,7 @@ def _joined(parts: Sequence[Any]) -> Ints:
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)
 
 
-def _stacked(parts: Sequence[Any], gdim: int, kind: Any = float) -> Any:
-    tail = parts[0].shape[1:] if parts else (gdim,)
+def _stacked(parts: Sequence[Any], tail: tuple[int, ...], kind: Any = float) -> Any:
     return np.concatenate([np.zeros((0, *tail), dtype=kind), *parts])
 
 

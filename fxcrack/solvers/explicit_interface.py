@@ -420,7 +420,9 @@ class InterfaceDynamics:
     def open_forces(self) -> Array:
         """Forces on the slave side of the open rows, shape (n_open, gdim), force."""
         total = self._acting.total
-        return np.zeros_like(self.gap) if total is None else total
+        if total is None:
+            return np.zeros((len(self.lumped.open), self.lumped.frames.shape[1]))
+        return total
 
     def smallest_gap(self, rows: Bools) -> tuple[float, int]:
         """Smallest normal gap among some rows, and the row; 0 and -1 where none is open."""
