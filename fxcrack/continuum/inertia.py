@@ -277,6 +277,14 @@ class InertiaForces(Term):
         self._c_known.x.array[:] = v + alpha_f * (last["v"] - last["c"]) / keep
         self._w[:] = 0.0
 
+    def expect(self, dt: float) -> None:
+        """Have the tangent of increments of a length before the first one begins.
+
+        Args:
+            dt: The length, time.
+        """
+        self._take_dt(dt)
+
     def _take_dt(self, dt: float) -> None:
         """Set b_u and c_u for increments of a length; 0 before the first one."""
         if abs(dt - self._dt) <= _SAME_LENGTH * dt:

@@ -63,7 +63,7 @@ class Debond:
         self.__dict__.update({"release": _BY_DEFAULT} | state)
 
     def __post_init__(self) -> None:
-        """Refuse what no model could mend."""
+        """Refuse what no model could make right."""
         example = "Interface('upper_face', 'lower_face', bonded=...)"
         check_instance("Debond", "interface", self.interface, Interface, example)
         where = f"interface '{self.interface.title}'"
@@ -89,6 +89,13 @@ class Debond:
                 f"{type(self.criterion).__name__}"
                 f"{'' if self.criterion.knows_toughness else ', which knows no toughness'}; use "
                 f"{release_laws.names_of(possible)}"
+            )
+        gradual = self.release.driver != "once" or self.criterion.softens
+        if gradual and any(c.needs_free_faces for c in (self.criterion, *self.watch)):
+            raise InputError(
+                f"{where}: method='domain' needs crack faces without bond forces, which a gradual "
+                "release leaves behind the tip; use StepRelease() (and VCCT), or method='vcct' or "
+                "method='closure'"
             )
         try:
             self.criterion.check_bond(normal_only=self.interface.normal_only)
