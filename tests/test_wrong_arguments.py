@@ -145,8 +145,32 @@ CALLS: list[Call] = [
         },
     ),
     (fx.EnhancedVCCT, {"GIc": 0.2, "GIc_p": 0.3}),
-    (fx.Fatigue, {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False}),
-    (fx.Paris, {"c1": 1.0, "c2": -2.0, "c3": 1.0, "c4": 1.0, "r1": 0.01, "r2": 0.85}),
+    (
+        fx.Fatigue,
+        {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False, "partial": True},
+    ),
+    (
+        fx.Paris,
+        {
+            "c1": 1.0, "c2": -2.0, "c3": 1.0, "c4": 1.0, "r1": 0.01, "r2": 0.85, "drive": "dK",
+            "normalised": True,
+        },
+    ),
+    (fx.Fatigue, {"GIc": 0.2, "growth": fx.ParisK(1.0, 2.0, 7e4, 0.3)}),
+    (fx.ParisK, {"C": 1.0, "m": 2.0, "E": 7e4, "nu": 0.3, "state": "plane strain", "dK_th": 1.0}),
+    (
+        fx.Blanco,
+        {
+            "C_I": 1.0, "m_I": 2.0, "C_II": 1.0, "m_II": 3.0, "C_m": 2.0, "m_m": 1.0, "c1": 0.0,
+            "c2": -1.0, "r1": ([0.0, 1.0], [0.1, 0.2]), "drive": fx.Walker(0.5),
+        },
+    ),
+    (
+        fx.KenaneBenzeggagh,
+        {"C_I": 1.0, "m_I": 2.0, "C_II": 1.0, "m_II": 3.0, "p": 2.0, "q": 1.0, "normalised": False},
+    ),
+    (fx.Walker, {"gamma": 0.5}),
+    (fx.Elber, {"a": 0.5, "b": 0.4}),
     (fx.BK, {"eta": 1.6}),
     (fx.Reeder, {"eta": 1.6}),
     (fx.Power, {"am": 1.0, "an": 1.0, "ao": 1.0}),
@@ -189,7 +213,7 @@ CALLS: list[Call] = [
     ),
     (fx.Cycles, {"period": (0.0, 1.0), "n_max": 10.0}),
     (fx.NewtonOptions, {"tolerance": 1e-10, "max_iterations": 25, "reuse": True, "balance": 1e-5}),
-    (fx.CondensedOptions, {"method": "auto", "window_mb": 10.0, "rows": 1.0, "rtol": 1e-6}),
+    (fx.CondensedOptions, {"method": "auto", "retained_mb": 10.0, "rows": 1.0, "rtol": 1e-6}),
     (fx.Checkpoint, {"path": "a.npz", "every": 3, "seconds": 1.0}),
     (fx.Split, {"surface": "s", "slave": "a", "master": "b", "toward": (0.0, 1.0)}),
 ]  # fmt: skip

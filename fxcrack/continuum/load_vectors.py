@@ -17,13 +17,15 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import InputError
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import (
     BodyForce,
     Field,
     Load,
     Moment,
+    Monitor,
     PointForce,
     PointMoment,
     Pressure,
@@ -101,6 +103,26 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
     return vector
 
 
+def monitor_weights(continuum: Continuum, monitor: Monitor) -> Array:
+    """Weights of the owned dofs in a monitored value, shape (n_local,); collective.
+
+    Raises:
+        InputError: The direction has another number of components, or the group does not fit.
+    """
+    out = np.zeros(continuum.n_local)
+    for term in monitor.terms:
+        if len(term.direction) != continuum.gdim:
+            raise InputError(
+                f"Monitor('{term.title}'): direction has {len(term.direction)} components, "
+                f"{continuum.gdim} are needed"
+            )
+        nodes = continuum.owned_nodes(term.where)
+        count = continuum.comm.allreduce(len(nodes))
+        for i, component in enumerate(term.direction):
+            out[continuum.layout.dof(nodes, i)] += component / count
+    return out
+
+
 def _check_components(continuum: Continuum, value: tuple[Field, ...], title: str) -> None:
     given = len(value) if hasattr(value, "__len__") else "no list of"
     if given != continuum.gdim:
@@ -113,7 +135,7 @@ def _vector(continuum: Continuum, value: tuple[Field, ...], title: str) -> Any:
 
 
 def _point_force(
-    continuum: Continuum, where: str, value: tuple[float, ...], title: str
+    continuum: Continuum, where: str, value: tuple[Field, ...], title: str
 ) -> PETSc.Vec:
     _check_components(continuum, value, title)
     layout = continuum.layout
@@ -121,5 +143,16 @@ def _point_force(
     count = continuum.comm.allreduce(len(nodes))
     vector = PETSc.Vec().createMPI((layout.n_local, layout.n_global), comm=continuum.comm)
     for i, component in enumerate(value):
-        vector.array[layout.dof(nodes, i)] = component / count
+        found: Array | float = 0.0
+        problem = None
+        try:
+            if callable(component):
+                x = continuum.positions()[nodes]
+                found = numbers_at(f"load '{title}'", f"value[{i}]", component, x)
+            else:
+                found = float(component)
+        except InputError as error:  # on this rank, perhaps
+            problem = str(error)
+        raise_on_all_ranks(continuum.comm, problem)
+        vector.array[layout.dof(nodes, i)] = found / count
     return vector

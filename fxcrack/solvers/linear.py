@@ -81,7 +81,7 @@ class LinearSolver(InterfaceSolver):
         if options.method == "iterative" or (options.method == "auto" and self._too_large()):
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(
-                continuum, pairs, supports, rtol=options.rtol, cap_mb=options.window_mb
+                continuum, pairs, supports, rtol=options.rtol, cap_mb=options.retained_mb
             )
         self._n_thermal = sum(isinstance(x, ThermalLoad) for x in loads)
         self._held_energies: Array | None = None
@@ -127,6 +127,7 @@ class LinearSolver(InterfaceSolver):
         coordinates = found.coordinates
         n_forces = len(self.loads)
         system = ContactSystem(found.schur, coordinates.n_retained, self.n_loads, n_forces)
+        system.cholesky.restraint = self.restraint(roles, coordinates)
         if self.columns is None:
             # a body that is nearly incompressible has a much larger diagonal than S
             system.cholesky.round_off = _ROUND_OFF * np.abs(direct.diagonal)
@@ -144,8 +145,9 @@ class LinearSolver(InterfaceSolver):
         self.timings.add("transform", start)
         start = time.perf_counter()
         found = DirectCondensation(
-            stiffness, coordinates, self.borders, self.timings, method=self.options.method
-        )
+            stiffness, coordinates, self.borders, self.timings, method=self.options.method,
+            doubt=self.restraint(roles, coordinates).judge,
+        )  # fmt: skip
         seconds = self.continuum.comm.bcast(time.perf_counter() - start)
         assert isinstance(self._cost, CostModel)
         self._cost.observe(coordinates.n_retained, seconds)

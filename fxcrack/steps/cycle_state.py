@@ -9,6 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools
+from fxcrack.criteria import CycleRates
+from fxcrack.criteria.ligaments import Ligaments
 
 
 @dataclass(frozen=True)
@@ -16,17 +18,17 @@ class TipCycle:
     """One stabilised cycle at the tips of an interface.
 
     Attributes:
-        dG: Range of the total rate, shape (n,), force/length.
-        G_max: Its largest value, likewise.
-        G_c: Critical total rate at the mode mix of G_max, likewise.
-        dadN: Growth per cycle, shape (n,), length: by the Paris law, 0 below the threshold, the
-            whole element beyond the upper limit.
+        rates: Energy release rates at n front nodes.
+        dadN: Growth per cycle, shape (n,), length: by the law, 0 below the threshold, the whole
+            element beyond the upper limit.
     """
 
-    dG: Array
-    G_max: Array
-    G_c: Array
+    rates: CycleRates
     dadN: Array
+
+    def column(self, name: str) -> Array:
+        """G_max, dG, G_c or dadN, shape (n,)."""
+        return self.dadN if name == "dadN" else np.asarray(getattr(self.rates, name))
 
 
 _COLUMNS = ("N", "interface", "node", "a", "G_max", "dG", "G_c", "dadN", "released")
@@ -40,6 +42,7 @@ class FatigueState:
         N: Cycles so far, over all steps.
         waiting: Per pair, slave nodes at which onset is still to come, shape (n_nodes,).
         credit: Per pair, growth within the element of each slave node, shape (n_nodes,), length.
+        ligaments: Per pair, elements that fronts have passed in part.
         table: One entry per tip and stabilised cycle in each column: N and the crack length at
             its beginning (of the tip in 2-D, the mean of the front in 3-D), the values of
             :class:`TipCycle` there, and whether the tip was released at its end.
@@ -48,11 +51,12 @@ class FatigueState:
     N: float = 0.0
     waiting: dict[int, Bools] = field(default_factory=dict)
     credit: dict[int, Array] = field(default_factory=dict)
+    ligaments: dict[int, Ligaments] = field(default_factory=dict)
     table: dict[str, list[float | int | str | bool]] = field(
         default_factory=lambda: {name: [] for name in _COLUMNS}
     )
 
-    def meet(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
+    def register_front(self, p: int, front: npt.NDArray[np.int64], n_nodes: int) -> None:
         """Register a front; the nodes of the first one on a pair wait for onset.
 
         Args:
@@ -64,6 +68,7 @@ class FatigueState:
             self.waiting[p] = np.zeros(n_nodes, dtype=np.bool_)
             self.waiting[p][front] = True
             self.credit[p] = np.zeros(n_nodes)
+            self.ligaments[p] = Ligaments.none(n_nodes)
 
     def tabulate(
         self,
@@ -85,7 +90,7 @@ class FatigueState:
             released: Whether each tip is released at its end, shape (n,).
         """
         n = len(nodes)
-        rates = [getattr(cycle, name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
+        rates = [cycle.column(name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
         columns = [[N] * n, [interface] * n, nodes.tolist(), lengths, *rates, released.tolist()]
         for name, values in zip(_COLUMNS, columns, strict=True):
             self.table[name] += values

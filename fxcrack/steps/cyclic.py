@@ -27,10 +27,12 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
 from fxcrack.criteria import (
     CycleJump,
+    CycleRates,
     Regime,
     cycle_jump,
     total,
 )
+from fxcrack.criteria.cycle_rates import joined
 from fxcrack.criteria.energy_release import RateEvaluator
 from fxcrack.criteria.evaluator import repeat_tips
 from fxcrack.equilibrium.contact import Equilibrium
@@ -46,12 +48,18 @@ from fxcrack.steps.element_growth import (
     after_jump,
     cycles_of,
     cyclic_parts,
-    joined,
     lengths_of,
     together,
 )
 from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.load_path import LoadPath
+from fxcrack.steps.partial_growth import (
+    Block,
+    PartialGrowth,
+    attach_ligaments,
+    grows_in_part,
+    passed_area,
+)
 from fxcrack.steps.release import release_tips
 from fxcrack.steps.rows import load_columns
 from fxcrack.steps.static import Static
@@ -103,6 +111,7 @@ class _Cycling:
         self._cycles = cycles
         self._limit = analysis.fatigue.N + cycles.n_max
         self._seen: list[TipCycle] = []
+        self._partly = False
         columns = load_columns(analysis.solver)
         names = [load if moves else answer for load, answer, moves in columns]
         self._corners = cycles.corners(analysis.loads_at, analysis.load_breaks(), names)
@@ -115,6 +124,12 @@ class _Cycling:
         else:
             top, event, self._limit = resume["top"], resume["event"], resume["limit"]
             self._begin_at(top)
+        self._partly = grows_in_part(self._analysis)
+        partly = None
+        if self._partly:
+            partly = PartialGrowth(self._analysis, self._stabilised_cycle, self._limit)
+        attach_ligaments(self._analysis)
+        self._analysis.evaluate_tips()
         known = False
         while True:
             driver.checkpoint_point(event=event, top=top, limit=self._limit)
@@ -124,15 +139,20 @@ class _Cycling:
             reason = driver.ended()
             if reason:
                 return reason
-            jump = self._grow()
+            jump: CycleJump | Block
+            if partly is not None:
+                jump = partly.until_release(self._seen)
+                self._seen = jump.seen
+            else:
+                jump = self._grow()
             if jump.event in ("arrest", "limit"):
                 driver.record(jump.event)
                 if jump.event == "limit":
                     return f"{self._cycles.n_max:g} cycles done"
                 return "arrest: no tip grows, however many cycles follow"
             event = "unstable" if jump.event == "unstable" else "release"
-            known = event == "release"
-            if not known:
+            known = event == "release" or self._partly
+            if isinstance(jump, CycleJump) and not known:
                 self._seen = []
                 self._release(jump.release, fatigue.N)
 
@@ -142,7 +162,17 @@ class _Cycling:
         for (g, v), cycle in zip(self._analysis.at_tips(), self._seen, strict=False):
             if len(v.tips):
                 for name in ("G_max", "dG", "dadN"):
-                    row[f"{name}[{g.title}]"] = float(getattr(cycle, name)[v.largest])
+                    row[f"{name}[{g.title}]"] = float(cycle.column(name)[v.largest])
+        if self._partly:
+            for g, v in self._analysis.at_tips():
+                passed = passed_area(self._analysis, g, v)
+                area = g.extent.area(v.tips) + passed
+                row[f"area[{g.title}]"] = area
+                grown = g.extent.over_front(passed)
+                if g.front.surface.dim == 1:
+                    part = self._analysis.fatigue.ligaments[g.p].part[v.tips.node]
+                    grown = float((part * advance(v.tips)).max(initial=0.0))
+                row[f"a[{g.title}]"] = g.extent.length(v.tips) + grown
         return row
 
     # -- one cycle -----------------------------------------------------------------------
@@ -159,7 +189,7 @@ class _Cycling:
             self._begin_at(top)
         self._load_to(path, self._corners[0][0])
         for g, v in analysis.at_tips():
-            analysis.fatigue.meet(g.p, v.tips.node, g.front.surface.n_nodes)
+            analysis.fatigue.register_front(g.p, v.tips.node, g.front.surface.n_nodes)
         return top
 
     def _begin_at(self, top: int) -> None:
@@ -248,19 +278,18 @@ class _Cycling:
         for i, (g, v) in enumerate(self._analysis.at_tips()):
             criterion, evaluator = cyclic_parts(g)
             if not len(v.tips):
-                out.append(TipCycle(*np.zeros((4, 0))))
+                out.append(TipCycle(CycleRates(*np.zeros((5, 0))), np.zeros(0)))
                 continue
             rates = [
                 rates_between(evaluator, v.tips, a.measured[i], b.measured[i])
                 for a, b in pairwise(way)
             ]
-            dG, top, critical = criterion.cycle(
-                np.concatenate(rates), evaluator.toughness[v.tips.node]
-            )
-            regime = criterion.paris.regime(top, critical)
-            growth = np.where(regime == Regime.PARIS, criterion.paris.growth_rate(dG), 0.0)
+            found = criterion.cycle(np.concatenate(rates), evaluator.toughness[v.tips.node])
+            law = criterion.growth_law
+            regime = law.regimes(found)
+            growth = np.where(regime == Regime.PARIS, law.growth(found), 0.0)
             growth = np.where(regime == Regime.UNSTABLE, advance(v.tips), growth)
-            out.append(TipCycle(dG, top, critical, growth))
+            out.append(TipCycle(found, growth))
         return out
 
     # -- over the cycles to the next release ---------------------------------------------
@@ -273,7 +302,7 @@ class _Cycling:
         cycles that are allowed do not suffice, nothing is released.
         """
         front, seen = self._front(), self._seen
-        tried = np.zeros(len(front.rates.dG), dtype=np.bool_)
+        tried = np.zeros(len(front.da), dtype=np.bool_)
         best: tuple[float, CycleJump] | None = None
         jump = self._jump(front, tried, np.inf)
         while jump.event == "growth" and (best is None or jump.cycles - front.N < best[0]):
@@ -333,10 +362,10 @@ class _Cycling:
         keep = np.repeat([c.credit for c in criteria], counts)
         return TipsBefore(
             N=fatigue.N,
-            law=together([c.paris for c in criteria], counts),
+            law=together([c.growth_law for c in criteria], counts),
             tips=tips,
             counts=counts,
-            rates=joined(self._seen),
+            rates=joined([c.rates for c in self._seen]),
             da=np.concatenate([advance(t) for t in tips]),
             grown=np.where(
                 keep, np.concatenate([fatigue.credit[p][nodes] for p, nodes in on]), 0.0
@@ -362,9 +391,11 @@ class _Cycling:
         rates = front.rates
         return cycle_jump(
             front.law,
-            np.where(stopped, 0.0, rates.dG),
-            np.where(stopped, 0.0, rates.G_max),
-            rates.G_c,
+            replace(
+                rates,
+                dG=np.where(stopped, 0.0, rates.dG),
+                G_max=np.where(stopped, 0.0, rates.G_max),
+            ),
             front.da,
             cycles=front.N,
             initiated=front.initiated,
