@@ -237,6 +237,29 @@ def test_a_body_in_free_flight_follows_its_force(comm: MPI.Intracomm) -> None:
     assert np.abs(column(history, "balance")).max() < 1e-12 * work[-1]
 
 
+def test_bodies_at_rest_that_may_touch(comm: MPI.Intracomm) -> None:
+    """No load, no motion, no forces: nothing to divide by. Found by a random scene.
+
+    A load on the free one comes when there are no forces in the bodies yet either.
+    """
+    for load in (0.0, 1e-3):
+        face = fx.Interface(
+            "upper_face", "lower_face", bonded=nowhere, contact=True, gap="keep", name="base"
+        )
+        scene = fx.Scene(
+            blocks(comm, 0.1, *3 * (np.array([0.0, 0.5, 1.0]),)),
+            materials=fx.Isotropic(1.0, 0.3, density=1.0),
+            model=fx.PlaneStress(),
+            bonds=[face],
+            supports=[fx.Displacement("bottom", x=0.0, y=0.0)],
+            loads=[fx.Pressure("top", load, amplitude=fx.Amplitude((0.0,), (1.0,)))],
+            effects=[fx.Inertia(rho_inf=1.0)],
+        )
+        history = scene.run(fx.Dynamic(until=fx.Time(0.4), dt=0.1), progress=False)
+        assert history.reason == "time 0.4 reached"
+        assert (history.rows[-1]["kinetic_energy"] > 0.0) == (load > 0.0)
+
+
 @pytest.mark.mpi
 def test_two_free_bars_exchange_their_velocities(comm: MPI.Intracomm) -> None:
     """Equal bars, one at v, one at rest (E = rho = A = L = 1): in contact for 2 L/c, F = v/2.

@@ -101,6 +101,13 @@ class Term:
         """
         return 0.0
 
+    def path_spent(self, u: fem.Function) -> float:
+        """Energy it dissipates on the straight path from the last commit to u; collective.
+
+        In force x length.
+        """
+        return 0.0
+
     def work(self) -> float:
         """Work done on the bodies through the term up to the last commit; collective.
 

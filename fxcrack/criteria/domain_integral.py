@@ -437,6 +437,7 @@ class DomainIntegral:
         whole = parts.sum()
         # where nothing is released, there is nothing to share out
         shares = parts / whole if whole > 0.0 else np.array([1.0, 0.0, 0.0])
+        shares[np.abs(shares) < _NO_SHARE] = 0.0
         return total / ring.area, shares, every
 
     def _energy(self, ring: Ring, gradient: Array, heat: Array, load: Array) -> float:
@@ -476,6 +477,9 @@ class DomainIntegral:
                 length,
             )
 
+
+_NO_SHARE = 1e-12
+"""Shares of a mode below this are round-off."""
 
 _CLOSED = 1e-9
 """Openings below this part of the jump behind a tip are none."""

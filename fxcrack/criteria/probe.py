@@ -93,6 +93,14 @@ class FrontProbe(Protocol):
         """
         ...
 
+    def round_off(self, nodes: Ints, state: State) -> Array:
+        """How large bond forces may be by round-off alone.
+
+        Returns:
+            Largest of the components, shape (...) [force].
+        """
+        ...
+
     def jumps(self, nodes: Ints, state: State) -> Array:
         """Displacement of slave nodes less that of the master surface at their place.
 

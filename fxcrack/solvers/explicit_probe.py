@@ -76,6 +76,10 @@ class ExplicitFrontProbe:
         """Bond forces, tension positive, global vectors of shape (..., 3) [force]."""
         return -self._vectors(nodes, self._values.bonds)
 
+    def round_off(self, nodes: Ints, state: Any) -> Array:
+        """Nothing: forces of explicit dynamics are not searched for a load, shape (...) [force]."""
+        return np.zeros(np.shape(nodes))
+
     def jumps(self, nodes: Ints, state: Any) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""
         return self._vectors(nodes, self._values.jumps)

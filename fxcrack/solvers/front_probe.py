@@ -14,6 +14,9 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.base import Solver
 from fxcrack.solvers.condensed_bodies import CondensedBodies
 
+_OF_PRODUCTS = 1e-11
+"""Round-off of a bond force as a part of the products it is the sum of, where no more is known."""
+
 _UNBOUNDED = 1e100
 """Jump per force of nodes that hold a body alone."""
 
@@ -46,6 +49,18 @@ class CondensedFrontProbe:
         values = np.zeros(solver.system.n_retained)
         values[rows] = -solver.system.forces(state, rows)
         return solver.vectors(self._p, nodes, values)
+
+    def round_off(self, nodes: Ints, state: Equilibrium) -> Array:
+        """How large bond forces may be by round-off alone, shape (...) [force]."""
+        system = self._solver.system
+        index = self._solver.index[self._p][nodes]
+        x = np.abs(np.concatenate([state.jump, state.loads]))
+        # an entry S_ij is off by what those on the diagonal of the bodies' matrix allow
+        error = np.broadcast_to(np.asarray(system.cholesky.round_off), len(system.schur))
+        each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
+        if not each.any() and system.n_retained:
+            each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
+        return np.asarray(each[np.where(index >= 0, index, -1)].max(axis=-1))
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""

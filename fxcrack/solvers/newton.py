@@ -244,7 +244,7 @@ class NewtonSolver(InterfaceSolver):
         Raises:
             ConvergenceError: None was found; the accepted state is in force again.
         """
-        if self.bodies.closed:
+        if self.bodies.accountable:
             self.energy.now()
         self._before = self.interface_state()
         dynamic = self.bodies.dynamic
@@ -273,8 +273,8 @@ class NewtonSolver(InterfaceSolver):
         Collective.
 
         Args:
-            strict: Refuse an increment whose energies do not balance to the tolerance, where bodies
-                store all work; else one that is off by more than a part of them that no equilibrium
+            strict: Refuse an increment whose energies do not balance to the tolerance, where they
+                are known; else one that is off by more than a part of them that no equilibrium
                 on the way could be, or none at all (``None``).
 
         Raises:
@@ -288,7 +288,7 @@ class NewtonSolver(InterfaceSolver):
         except NotPositiveDefinite as error:
             self._fail()
             raise ConvergenceError(_UNSTABLE) from error
-        if strict is not None and trial.iterations and self.bodies.closed:
+        if strict is not None and trial.iterations and self.bodies.accountable:
             overlap = self._overlap_work(trial.points[0][1], trial.end)
             part = self.newton.balance if strict else ANOTHER
             off = self.energy.imbalance(trial, len(self.loads), overlap, part)
@@ -456,15 +456,15 @@ class NewtonSolver(InterfaceSolver):
 
         Returns:
             What :meth:`InterfaceSolver.collect` gives; on rank 0 bodies.* of
-            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (4,); and the
+            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (5,); and the
             tangent, see :func:`~fxcrack.solvers.newton_state.tangent_arrays`.
         """
         out = super().collect()
         out |= {f"bodies.{name}": values for name, values in self.bodies.state().items()}
         for p, known in enumerate(self.interfaces.pairing()):
             out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
-        drift, energy = self.tangent.drift, self.energy.largest
-        out["sums"] = np.array([self.pairing.energy, self.largest_force, energy, drift])
+        sums = self.pairing.energy, self.largest_force, self.energy.largest, self.tangent.drift
+        out["sums"] = np.array([*sums, self.energy.most])
         out |= tangent_arrays(self.tangent, self.system, self.face_loads)
         return out
 
@@ -489,7 +489,8 @@ class NewtonSolver(InterfaceSolver):
         self.interfaces.move_fronts(self.u)
         self.at = time
         sums = (float(x) for x in arrays["sums"])
-        self.pairing.energy, self.largest_force, self.energy.largest, drift = sums
+        self.pairing.energy, self.largest_force, self.energy.largest, drift, *most = sums
+        self.energy.most = most[0] if most else self.energy.largest  # earlier ones did not have it
         super().resume(arrays, time)
         assert self._resumed is not None
         self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, drift)

@@ -119,7 +119,7 @@ class Crack:
         f, report = self.evaluator.value(tips, measured)
         for criterion, other in zip(self.debond.watch, self.watched, strict=True):
             found = other.value(tips, other.measure(tips, state, time))[1]
-            report |= _named_apart(found, report, criterion)
+            report = {**_named_apart(found, report, criterion), **report}
         return TipValues(tips, f, report, measured, state)
 
     def look_for_overlap(self, tips: Tips, state: Equilibrium) -> None:
