@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fxcrack.equilibrium.discrete_gradient import softening_force, softening_potential
+from fxcrack.equilibrium.discrete_gradient import (
+    force_of_one,
+    softening_force,
+    softening_potential,
+)
 
 number = st.floats(0.0, 1.0)
 
@@ -64,3 +69,14 @@ def test_secant_force_is_the_mean_of_both_ends() -> None:
 def test_a_long_increment_breaks_the_bond_at_once_with_the_whole_energy() -> None:
     (force,) = softening_force(*one(2.0, 0.1, 0.0, 0.0, 5.0, 1e-3))
     assert abs(force * (5.0 - 1e-3 * force) - 0.1) <= 1e-14
+
+
+@given(
+    low=st.floats(-1.0, 1.0), top=number, change=st.floats(-2.0, 2.0), log_c=st.floats(-6.0, 3.0)
+)
+def test_one_bond_has_the_force_of_an_array(
+    low: float, top: float, change: float, log_c: float
+) -> None:
+    low, c = min(low, top), 10.0**log_c
+    (known,) = softening_force(*one(1.0, 1.0, low, top, change, c))
+    assert force_of_one(1.0, 1.0, low, top, change, c) == pytest.approx(known, rel=1e-12, abs=1e-14)

@@ -30,6 +30,7 @@ import scipy.sparse as sp
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
+from fxcrack.base.sparse import Product, by_component
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
@@ -85,6 +86,10 @@ class LumpedInterface:
         group_mass: Mass of the nodes with that of the slaves tied to them, shape (n_nodes,).
         inverse: 1/group_mass per component, 0 where prescribed, shape (n_nodes, gdim).
         compliance: H of the open rows per component, shape (n_open, gdim).
+        accelerations: Accelerations of the nodes by the forces on them, those that are prescribed
+            zero; on components of the nodes, shape (n_nodes gdim, n_nodes gdim).
+        following: Motion of the nodes by that of those that follow nothing, same shape.
+        version: How often ties, masses or frames have changed.
     """
 
     def __init__(
@@ -121,6 +126,7 @@ class LumpedInterface:
         self.gap = np.concatenate(
             [np.zeros(0), *(p.gap[j] for p, j in zip(pairs, self.jumped, strict=True))]
         )
+        self.version = 0
         self.set_pairing(pairs)
 
     def _support_of(self, pair: Pair) -> Ints:
@@ -188,18 +194,24 @@ class LumpedInterface:
         self._ties = [t for t in self._ties if len(t.rows)]
         self.group_mass = self.collect(self.mass[:, None].copy())[:, 0]
         self.inverse = np.where(self.which < 0, 1.0 / self.group_mass[:, None], 0.0)
+        gdim = self.which.shape[1]
+        motion = self._motion()
+        self.following = following = by_component(motion, gdim)
+        self._accelerations = sp.csr_matrix(
+            following @ sp.diags(self.inverse.ravel()) @ following.T
+        )
+        self.accelerations = Product(self._accelerations)
         self._open_slaves = self.slave[self.open]
+        self.version += 1
         if self.simple:
             assert self.master is not None
             self._open_masters = self.master[self.open]
             both = self.inverse[self._open_slaves] + self.inverse[self._open_masters]
             self.compliance = np.asarray(both)
             return
-        n, m = len(self.nodes), len(self.open)
-        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self._open_slaves)), shape=(m, n))
-        self._jump = sp.csr_matrix(picks - self.weights[self.open])
+        self._jump = self.separations(self.open)
         self._jump_t = self._jump.T.tocsr()
-        self._root = sp.csr_matrix(self._jump @ self._motion())
+        self._root = sp.csr_matrix(self._jump @ motion)
         self._root_t = self._root.T.tocsr()
         self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
 
@@ -210,9 +222,14 @@ class LumpedInterface:
         weights = self.weights[rows]
         return _Tie(rows, self.slave[rows], None, (weights, weights.T.tocsr()))
 
-    def _motion(self) -> Any:
+    def _motion(self) -> sp.csr_matrix:
         """T, motion of all nodes by that of those that follow nothing, (n_nodes, n_nodes)."""
         n = len(self.nodes)
+        if self.simple:
+            assert self.master is not None
+            leads = np.arange(n)
+            leads[self.slave[self.tied]] = self.master[self.tied]
+            return sp.csr_matrix((np.ones(n), leads, np.arange(n + 1)), shape=(n, n))
         keep = np.ones(n)
         keep[self.slave[self.tied]] = 0.0
         out = sp.csr_matrix(sp.diags(keep))
@@ -220,7 +237,70 @@ class LumpedInterface:
             m = len(tie.rows)
             place = sp.csr_matrix((np.ones(m), (tie.slaves, np.arange(m))), shape=(n, m))
             out = out + place @ (self.weights[tie.rows] @ out)
-        return out
+        return sp.csr_matrix(out)
+
+    def _collected(self) -> sp.csr_matrix:
+        """What :meth:`collect` does to the values of the nodes, as a matrix (n_nodes, n_nodes)."""
+        out = sp.identity(len(self.nodes), format="csr")
+        for tie in self._ties:
+            out = out + self.weights[tie.rows].T @ out[tie.slaves]
+        return sp.csr_matrix(out)
+
+    # -- chosen rows, as matrices on components of the nodes -----------------------------
+
+    def separations(self, rows: Ints) -> sp.csr_matrix:
+        """E_s - W of some rows, on nodes: jumps by the motion of the nodes, (n, n_nodes)."""
+        m, n = len(rows), len(self.nodes)
+        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self.slave[rows])), shape=(m, n))
+        return sp.csr_matrix(picks - self.weights[rows])
+
+    def jumps_along(self, rows: Ints, directions: Array) -> sp.csr_matrix:
+        """Jumps of some rows along one direction each by the motion of the nodes.
+
+        Args:
+            rows: Shape (n,).
+            directions: Unit vectors, shape (n, gdim).
+
+        Returns:
+            On components of the nodes, shape (n, n_nodes gdim).
+        """
+        nodes = self.separations(rows)
+        gdim = directions.shape[1]
+        at = np.repeat(np.arange(len(rows)), np.diff(nodes.indptr))
+        data = nodes.data[:, None] * directions[at]
+        columns = gdim * nodes.indices.astype(np.int64)[:, None] + np.arange(gdim)
+        return sp.csr_matrix(
+            (data.ravel(), columns.ravel(), gdim * nodes.indptr.astype(np.int64)),
+            shape=(len(rows), gdim * len(self.nodes)),
+        )
+
+    def bonds_of(self, rows: Ints) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """Bond forces on the slaves of some tied rows, without what supports of slaves hold.
+
+        Args:
+            rows: Shape (n,).
+
+        Returns:
+            By the forces on the nodes, and by prescribed accelerations of the nodes; on components,
+            shape (n gdim, n_nodes gdim) each.
+        """
+        gdim, s = self.which.shape[1], self.slave[rows]
+        at = (gdim * s[:, None] + np.arange(gdim)).ravel()
+        mass = sp.diags(np.repeat(self.group_mass[s], gdim))
+        if self.depth.any():
+            own = by_component(self._collected()[s], gdim)
+        else:
+            n = len(at)
+            shape = n, gdim * len(self.nodes)
+            own = sp.csr_matrix((np.ones(n), at, np.arange(n + 1)), shape=shape)
+        force, given = mass @ self._accelerations[at] - own, mass @ self.following[at]
+        held = self.held[rows]
+        if held.any():
+            frames = self.frames[rows]
+            free = np.einsum("nci,ni,ndi->ncd", frames, ~held, frames)
+            project = sp.block_diag(list(free), format="csr")
+            force, given = project @ force, project @ given
+        return sp.csr_matrix(force), sp.csr_matrix(given)
 
     def collect(self, values: Array) -> Array:
         """Add to the masters what tied slaves give them, in place.
