@@ -12,9 +12,9 @@ from petsc4py import PETSc
 
 from fxcrack.base import compat
 from fxcrack.base.arrays import Ints
-from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.errors import raise_on_all_ranks
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.load_vectors import load_vector
+from fxcrack.continuum.load_vectors import load_vector, monitor_weights
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 
@@ -43,16 +43,8 @@ def load_and_monitor_vectors(
         vector.scale(-1.0)
         out.append(vector)
     for monitor in monitors:
-        if len(monitor.direction) != continuum.gdim:
-            raise InputError(
-                f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
-                f"{continuum.gdim} are needed"
-            )
-        nodes = continuum.owned_nodes(monitor.where)
-        count = continuum.comm.allreduce(len(nodes))
         vector = PETSc.Vec().createMPI((continuum.n_local, continuum.n_global), comm=continuum.comm)
-        for i, component in enumerate(monitor.direction):
-            vector.array[continuum.layout.dof(nodes, i)] = component / count
+        vector.array[:] = monitor_weights(continuum, monitor)
         out.append(vector)
     for mine in followed:
         count = continuum.comm.allreduce(len(mine))

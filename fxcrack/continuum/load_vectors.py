@@ -24,6 +24,7 @@ from fxcrack.continuum.loads import (
     Field,
     Load,
     Moment,
+    Monitor,
     PointForce,
     PointMoment,
     Pressure,
@@ -99,6 +100,25 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
     vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
+
+
+def monitor_weights(continuum: Continuum, monitor: Monitor) -> Array:
+    """Weights of the owned dofs in a monitored displacement, shape (n_local,); collective.
+
+    Raises:
+        InputError: The direction has another number of components, or the group does not fit.
+    """
+    if len(monitor.direction) != continuum.gdim:
+        raise InputError(
+            f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
+            f"{continuum.gdim} are needed"
+        )
+    nodes = continuum.owned_nodes(monitor.where)
+    count = continuum.comm.allreduce(len(nodes))
+    out = np.zeros(continuum.n_local)
+    for i, component in enumerate(monitor.direction):
+        out[continuum.layout.dof(nodes, i)] = component / count
+    return out
 
 
 def _check_components(continuum: Continuum, value: tuple[Field, ...], title: str) -> None:

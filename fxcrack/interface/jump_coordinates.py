@@ -103,6 +103,23 @@ class JumpCoordinates:
         return self.n_retained + self.n_supports + self.n_borders
 
 
+def global_vectors(index: Ints, frames: Array, values: Array) -> Array:
+    """Jump or force components at slave nodes as global vectors.
+
+    Args:
+        index: Number of each component, -1 where it has none, shape (..., gdim).
+        frames: Frames of the nodes, shape (..., gdim, gdim).
+        values: Values of the numbered components, shape (n,).
+
+    Returns:
+        Shape (..., 3); zero where a component has no number.
+    """
+    local = np.append(values, 0.0)[index]  # the last one where the index is -1
+    out = np.zeros((*index.shape[:-1], 3))
+    out[..., : index.shape[-1]] = np.einsum("...ck,...k->...c", frames, local)
+    return out
+
+
 def build_coordinates(
     layout: DofLayout,
     pairs: Sequence[Pair],

@@ -23,39 +23,37 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import InputError
 from fxcrack.base.timings import Timings
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.internal_forces import InternalForces
-from fxcrack.continuum.load_vectors import LoadPattern, load_vector
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.lumped_mass import lumped_mass
+from fxcrack.continuum.starting_velocity import starting_velocity
 from fxcrack.continuum.term import Term
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.front import Front
+from fxcrack.interface.jump_coordinates import global_vectors
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair, local_frames
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.explicit_energies import MotionEnergies, stored_energies, sums_over_ranks
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
+from fxcrack.solvers.explicit_loads import LoadsAndMonitors
+from fxcrack.solvers.explicit_mass import ScaledMass
 from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
-from fxcrack.solvers.explicit_state import (
-    Arrays,
-    InterfaceSnapshot,
-    MotionFiles,
-    MotionSnapshot,
-)
+from fxcrack.solvers.explicit_state import Arrays, InterfaceSnapshot, MotionFiles, MotionSnapshot
 from fxcrack.solvers.explicit_supports import PrescribedMotion
 from fxcrack.solvers.options import ExplicitOptions
-from fxcrack.solvers.stable_increment import HighestFrequency, rounded_down, start_vector
-
-_INSIDE = 1e-9
-"""Part of the way to the middle of its cells at which a node's first velocity is looked up."""
-
+from fxcrack.solvers.stable_increment import (
+    HighestFrequency,
+    chosen_increment,
+    rounded_down,
+    start_vector,
+)
 
 _AGAIN = 6
 """Lanczos steps that follow a tangent which has changed little."""
@@ -80,8 +78,8 @@ class ExplicitSolver:
         Those of :class:`fxcrack.solvers.base.AnySolver`, and
         bodies: Internal forces, with the displacement.
         velocity: In the middle of the last increment, shape (n_local,), length/time.
-        mass: Mass of the owned dofs, scaled, shape (n_local,).
-        added_mass: What mass scaling has added to it, same shape.
+        mass: Mass of the owned dofs, and what mass scaling has added to it.
+        energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
         dynamics: Motion and forces of the interfaces.
         dt: Increment, time.
@@ -104,7 +102,6 @@ class ExplicitSolver:
     ) -> None:
         self.continuum, self.pairs, self.supports = continuum, pairs, supports
         self.loads, self.monitors = loads, monitors
-        self.effect = effect
         self.comm = continuum.comm
         self.timings = Timings()
         self.fronts = [Front(p.surface, p.bonded, p.title) for p in pairs]
@@ -112,29 +109,22 @@ class ExplicitSolver:
         self.active = [False] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
         self.bodies = InternalForces(continuum, terms)
-        n, gdim = continuum.n_local, continuum.gdim
-        self._bare_mass = lumped_mass(continuum, effect)
-        self.mass, self.added_mass = self._bare_mass.copy(), np.zeros(n)
-        self._per_mass = 1.0 / self.mass
-        self._mass_is_scaled = False
-        self.velocity = self._starting_velocity()
+        self.mass = ScaledMass(lumped_mass(continuum, effect))
+        self.velocity = starting_velocity(continuum, effect.velocity)
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
-        self.options = ExplicitOptions()
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
         self._damping = float(effect.rayleigh[0])
-        self._damped = 0.0  # energy, this rank's part
-        self._work = 0.0  # of supports and loads, this rank's part
-        self.initial_energy = 0.0
+        self.energies = MotionEnergies(self.comm)
         self.monitored: list[float] = []
-        self._patterns = [self._pattern(load) for load in loads]
-        self._watched = [self._monitor(m) for m in monitors]
-        self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass)
+        self._outer = LoadsAndMonitors(continuum, loads, monitors)
+        self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass.values)
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
-        self._force = np.zeros(n)
+        self._force = np.zeros(continuum.n_local)
+        self._now: Array | None = None  # coordinates of the present increment
         self._files = MotionFiles(continuum)
-        zero = np.zeros(self.lumped.n_rows * gdim)
+        zero = np.zeros(self.lumped.n_rows * continuum.gdim)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
 
     # -- what does not change ------------------------------------------------------------
@@ -161,58 +151,9 @@ class ExplicitSolver:
         self.bonds = np.zeros((lumped.n_rows + 1, gdim))
         self.jumps = np.zeros((lumped.n_rows + 1, gdim))
         self.face_loads: Array | None = None
-        self._face_patterns: list[Array] = []
-        n = self.continuum.n_local
-        found = [nodes.gather(p.dense(n))[lumped.slave] for p in self._patterns]
-        if any(np.any(f) for f in found):
-            self._face_patterns = found
+        if self._outer.take_faces(lumped):
             self.face_loads = np.zeros_like(self.bonds)
         self.dynamics.v = nodes.gather(self.velocity)
-
-    def _starting_velocity(self) -> Array:
-        velocity, gdim = self.effect.velocity, self.continuum.gdim
-        out = np.zeros((self.continuum.layout.n_owned, gdim))
-        if velocity is None:
-            return out.ravel()
-        if len(velocity) != gdim:
-            raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
-        x = self._places_within().T
-        for c, value in enumerate(velocity):
-            out[:, c] = value(x) if callable(value) else float(value)
-        return out.ravel()
-
-    def _places_within(self) -> Array:
-        """Positions of the owned nodes, by a trifle inside their own body, shape (n, 3).
-
-        The two nodes at one place of an interface belong to bodies that may move differently.
-        """
-        x, cells = self.continuum.positions(), self.continuum.space.dofmap.list
-        middle, count = np.zeros_like(x), np.zeros(len(x))
-        np.add.at(middle, cells, x[cells].mean(axis=1)[:, None])
-        np.add.at(count, cells, 1.0)
-        n = self.continuum.layout.n_owned
-        inside = middle[:n] / np.maximum(count[:n], 1.0)[:, None]
-        return np.asarray(x[:n] + _INSIDE * (inside - x[:n]))
-
-    def _pattern(self, load: Any) -> LoadPattern:
-        vector = load_vector(self.continuum, load)
-        out = LoadPattern(np.array(vector.array_r))
-        vector.destroy()
-        return out
-
-    def _monitor(self, monitor: Monitor) -> LoadPattern:
-        continuum = self.continuum
-        if len(monitor.direction) != continuum.gdim:
-            raise InputError(
-                f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
-                f"{continuum.gdim} are needed"
-            )
-        nodes = continuum.owned_nodes(monitor.where)
-        count = self.comm.allreduce(len(nodes))
-        mean = np.zeros(continuum.n_local)
-        for i, component in enumerate(monitor.direction):
-            mean[continuum.layout.dof(nodes, i)] = component / count
-        return LoadPattern(mean)
 
     # -- a step begins -------------------------------------------------------------------
 
@@ -228,52 +169,29 @@ class ExplicitSolver:
             InputError: The increment asked for is not stable.
         """
         start = clock.perf_counter()
-        self.options, self.active = options, active
+        self.active = active
         self.bodies.choose(options.operator)
         self.timings.add("operator", start)
         start = clock.perf_counter()
-        if isinstance(options.mass_scale, str):
-            assert options.dt is not None
-            self.set_mass(self._mass_for(options.dt))
-        elif options.mass_scale != 1.0 or self._mass_is_scaled:
-            self.set_mass(options.mass_scale * self._bare_mass)
+        if self.mass.choose(options, self.bodies):
+            self._take_mass()
         self.stable = self._stable_increment()
-        self.dt = options.safety * self.stable
-        if options.dt is not None:
-            if options.dt > self.stable:
-                raise InputError(
-                    f"Explicit: dt = {options.dt:g} is above the largest stable increment "
-                    f"{self.stable:g}; leave dt out, or let mass be added with mass_scale='dt'"
-                )
-            self.dt = float(options.dt)
+        self.dt = chosen_increment(options, self.stable)
         self.timings.add("stable increment", start)
         self.dynamics.penalty = options.penalty if options.contact == "penalty" else None
         if self.increments == 0:
             self._start(coordinates)
 
-    def _mass_for(self, dt: float) -> Array:
-        """Masses for which an increment is stable, shape (n_local,); collective.
-
-        Nodes get as much as Gershgorin's circles ask for, sum_j |K_ij|/m_i <= (2/dt)^2, which is
-        more than needed but leaves all other nodes alone.
-        """
-        sums = np.asarray(abs(self.bodies.stiffness()).sum(axis=1)).ravel()
-        by_node = self.continuum.layout.by_node(sums).max(axis=1)
-        needed = np.repeat(0.25 * (1.0 + 1e-9) * dt**2 * by_node, self.continuum.gdim)
-        return np.maximum(self._bare_mass, needed)
-
-    def set_mass(self, mass: Array) -> None:
-        """Take another mass of the owned dofs, shape (n_local,)."""
-        self.mass, self.added_mass, self._mass_is_scaled = mass, mass - self._bare_mass, True
-        self._per_mass = 1.0 / mass
+    def _take_mass(self) -> None:
+        """Give the interfaces the mass that was chosen; collective."""
         lumped = self.lumped
-        lumped.mass = lumped.nodes.gather(mass)[:, 0]
+        lumped.mass = lumped.nodes.gather(self.mass.values)[:, 0]
         self.dynamics.set_ties(lumped.tied)
 
     def _stable_increment(self) -> float:
         places = self.continuum.positions()[: self.continuum.layout.n_owned]
         start = start_vector(places, self.continuum.gdim)
-        self._highest = HighestFrequency(self.comm, self.mass, start)
+        self._highest = HighestFrequency(self.comm, self.mass.values, start)
         return rounded_down(2.0 / self._highest(self.bodies.tangent_product))
 
     def follow_bodies(self) -> None:
@@ -307,7 +225,7 @@ class ExplicitSolver:
         self.bodies.u.x.scatter_forward()
         self.dynamics.u = self.lumped.nodes.gather(u[: self.continuum.n_local])
         self.lumped.follow(self.dynamics.v)
-        self.initial_energy = sum(self.stored_now().values())
+        self.energies.initial = sum(self.stored_now().values())
 
     # -- one increment -------------------------------------------------------------------
 
@@ -322,15 +240,12 @@ class ExplicitSolver:
         columns = len(self.supports.columns)
         self._h = 0.5 * (self.last_dt + self.dt)
         self._now, self._loads, self._coordinates = now, now[columns:], then[:columns]
-        loads = self._loads
         force = np.negative(self.bodies.forces())
         if not self.increments:
             self._first = -force
-        for pattern, factor in zip(self._patterns, loads.tolist(), strict=True):
-            if factor:
-                pattern.add(force, factor)
+        self._outer.add_to(force, self._loads)
         if self._damping:
-            force -= self._damping * self.mass * self.velocity
+            force -= self._damping * self.mass.values * self.velocity
         self._force = force
         t1 = clock.perf_counter()
         nodes = self.lumped.nodes
@@ -352,10 +267,7 @@ class ExplicitSolver:
         self.bonds[rows] = forces
         self.jumps[lumped.open] = dynamics.gap
         if self.face_loads is not None:
-            self.face_loads[:-1] = sum(
-                factor * f
-                for factor, f in zip(self._loads.tolist(), self._face_patterns, strict=True)
-            )
+            self.face_loads[:-1] = self._outer.on_faces(self._loads)
 
     def _without_supports(self, rows: Ints, forces: Array) -> Array:
         """Bond forces without the components that supports hold, which are their reactions."""
@@ -372,15 +284,11 @@ class ExplicitSolver:
         u = self.bodies.u.x.array[:n]
         prescribed, dynamics = self.prescribed, self.dynamics
         reactions = self.reactions()
-        acting = [
-            (factor, p, p.values @ v[p.at])
-            for p, factor in zip(self._patterns, self._loads.tolist(), strict=True)
-            if factor
-        ]
+        power = self._outer.power(self._loads, v)
         if self._damping:
             before = v.copy()
         old = prescribed.motion(v, dynamics.v)
-        a *= self._per_mass
+        a *= self.mass.inverse
         if len(self._at_interface):
             a[self._at_interface] = dynamics.a[self._mine].ravel()
         a *= h
@@ -389,14 +297,16 @@ class ExplicitSolver:
         v += a
         v[prescribed.dofs] = prescribed.velocities(u, self._coordinates, dt)
         dynamics.advance(h, dt)
-        self._work += 0.5 * h * float(reactions @ (old + prescribed.motion(v, dynamics.v)))
-        for factor, pattern, power in acting:
-            self._work += 0.5 * h * factor * float(power + pattern.values @ v[pattern.at])
+        energies, mass = self.energies, self.mass.values
+        power += self._outer.power(self._loads, v)
+        power += float(reactions @ (old + prescribed.motion(v, dynamics.v)))
+        energies.work += 0.5 * h * power
         if self._damping:
-            self._damped += 0.5 * h * self._damping * float((before * self.mass) @ (before + v))
+            energies.damped += 0.5 * h * self._damping * float((before * mass) @ (before + v))
         if not self.increments:
             # the strain energy of the first half increment looks ahead to the whole of it
-            self.initial_energy += self._sum(0.25 * dt * float(self._first @ (v - begun)))[0]
+            more = 0.25 * dt * float(self._first @ (v - begun))
+            energies.initial += sums_over_ranks(self.comm, more)[0]
         np.multiply(v, dt, out=a)
         u += a
         if self.comm.size > 1:
@@ -414,47 +324,20 @@ class ExplicitSolver:
         prescribed, n = self.prescribed, self.continuum.n_local
         u, dofs = self.bodies.u.x.array[:n], self.prescribed.dofs
         speed = prescribed.velocities(u, self._coordinates, self.dt)
-        within = self.mass[dofs] * (speed - self.velocity[dofs]) / self._h - self._force[dofs]
+        within = (
+            self.mass.values[dofs] * (speed - self.velocity[dofs]) / self._h - self._force[dofs]
+        )
         return np.concatenate([within, prescribed.at_nodes(self.lumped, self.dynamics)])
 
     # -- energies ------------------------------------------------------------------------
-
-    def _sum(self, *parts: float) -> list[float]:
-        """Sums over ranks; collective."""
-        values = np.array(parts, dtype=float)  # bincount of nothing gives integers
-        if self.comm.size > 1:
-            self.comm.Allreduce(MPI.IN_PLACE, values)
-        return [float(x) for x in values]
 
     def stored_now(self) -> dict[str, float]:
         """Strain and kinetic energy in the middle of the last increment; collective.
 
         Before the first increment they are those of the start.
         """
-        v, dt, n = self.velocity, self.last_dt, self.continuum.n_local
-        bodies = self.bodies
-        square = v * v
-        kinetic, added = 0.5 * float(self.mass @ square), 0.5 * float(self.added_mass @ square)
-        now = bodies.u.x.array[:n].copy()
-        if bodies.linear:
-            strain = 0.5 * float((now - dt * v) @ bodies.forces())
-        else:
-            strain = 0.0
-            force = bodies.forces().copy()
-            energy = bodies.stored()
-            if dt > 0.0:
-                bodies.u.x.array[:n] = now - dt * v
-                bodies.u.x.scatter_forward()
-                energy = 0.5 * (energy + bodies.stored())
-                strain = -0.25 * dt * float((force - bodies.forces()) @ v)
-                bodies.u.x.array[:n] = now
-                bodies.u.x.scatter_forward()
-            strain += energy / self.comm.size
-        strain, kinetic, added = self._sum(strain, kinetic, added)
-        kinetic += self.lumped.excess_energy(self.dynamics.v)
-        out = {"strain_energy": strain, "kinetic_energy": kinetic}
-        if self._mass_is_scaled:
-            out["mass_scaling_energy"] = added
+        out = stored_energies(self.bodies, self.mass, self.velocity, self.last_dt)
+        out["kinetic_energy"] += self.lumped.excess_energy(self.dynamics.v)
         return out
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
@@ -472,23 +355,22 @@ class ExplicitSolver:
         if not self.lumped.simple:
             out["tie_energy"] = energies.ties
         if self._damping:
-            out["damping_energy"] = self._sum(self._damped)[0]
+            out["damping_energy"] = self.energies.totals()[1]
         return out
 
     def external_work(self) -> float:
         """Work of supports and loads up to the middle of the last increment; collective."""
-        return self._sum(self._work)[0]
+        return self.energies.totals()[0]
 
     # -- going back, and checkpoints -----------------------------------------------------
 
     def remember(self) -> MotionSnapshot:
         """What :meth:`recall` needs to return to the start of this increment; collective."""
         n = self.continuum.n_local
-        work, damped = self._sum(self._work, self._damped)
         return MotionSnapshot(
             self.bodies.u.x.array[:n].copy(), self.velocity.copy(),
             InterfaceSnapshot.of(self.dynamics), self.at, self.last_dt,
-            (work, damped, self.initial_energy), self.increments,
+            self.energies.totals(), self.increments,
         )  # fmt: skip
 
     def recall(self, saved: MotionSnapshot) -> None:
@@ -498,13 +380,11 @@ class ExplicitSolver:
         x.scatter_forward()
         self.velocity[:] = saved.v
         self.at, self.last_dt, self.increments = saved.at, saved.last_dt, saved.increments
-        first = self.comm.rank == 0
-        self._work, self._damped = (s if first else 0.0 for s in saved.sums[:2])
-        self.initial_energy = saved.sums[2]
+        self.energies.restore(saved.sums)
         self.dynamics.u = self.lumped.nodes.gather(x.array[:n])
         self.dynamics.v = self.lumped.nodes.gather(self.velocity)
         saved.interfaces.restore(self.dynamics)
-        if hasattr(self, "_now"):
+        if self._now is not None:
             columns = len(self.supports.columns)
             self.begin(self._now, np.append(self._coordinates, self._now[columns:]))
 
@@ -517,15 +397,7 @@ class ExplicitSolver:
             shape (n_nodes, gdim), per pair; loads, shape (n_loads,).
         """
         self.record_state()
-        saved = self.remember()
-        out: Arrays = {
-            "displacement": self._files.gather(saved.u),
-            "velocity": self._files.gather(saved.v),
-            "positions": self._files.positions(),
-            "motion": np.array([saved.at, saved.last_dt, *saved.sums, saved.increments]),
-            "loads": self.state.loads,
-        }
-        out |= {f"interfaces.{k}": v for k, v in saved.interfaces.arrays().items()}
+        out = self._files.arrays(self.remember()) | {"loads": self.state.loads}
         for p, (front, index) in enumerate(zip(self.fronts, self.index, strict=True)):
             out[f"bonded[{p}]"] = front.bonded
             out[f"jump[{p}]"] = np.append(self.state.jump, 0.0)[index]
@@ -542,31 +414,22 @@ class ExplicitSolver:
             InputError: The arrays do not fit the mesh.
         """
         self._files.check_positions(arrays["positions"])
-        at, last_dt, *sums, increments = arrays["motion"].astype(float).tolist()
-        part = {k.removeprefix("interfaces."): v for k, v in arrays.items() if "interfaces." in k}
         for p, front in enumerate(self.fronts):
             gone = front.bonded & ~arrays[f"bonded[{p}]"].astype(bool)
             if gone.any():
                 front.release(np.flatnonzero(gone))
-        self.recall(
-            MotionSnapshot(
-                self._files.scatter(arrays["displacement"]),
-                self._files.scatter(arrays["velocity"]),
-                InterfaceSnapshot.from_arrays(part), at, last_dt,
-                (sums[0], sums[1], sums[2]), int(increments),
-            )
-        )  # fmt: skip
+        self.recall(self._files.snapshot(arrays))
 
     # -- what criteria and output ask ----------------------------------------------------
 
     def record_state(self) -> None:
         """Take the present loads, reactions, jumps and forces as :attr:`state`; collective."""
+        assert self._now is not None
         lumped, columns = self.lumped, len(self.supports.columns)
         u = self.bodies.u.x.array[: self.continuum.n_local]
         reactions = self.prescribed.by_column(self.reactions(), columns)
-        conjugate = [*reactions.tolist(), *(float(p.values @ u[p.at]) for p in self._patterns)]
-        monitors = [float(p.values @ u[p.at]) for p in self._watched]
-        sums = self._sum(*conjugate, *monitors)
+        conjugate = [*reactions.tolist(), *self._outer.conjugates(u)]
+        sums = sums_over_ranks(self.comm, *conjugate, *self._outer.monitored(u))
         self.monitored = sums[len(conjugate) :]
         jumps = np.einsum("nci,nc->ni", lumped.frames, self.jumps[:-1])
         force = np.zeros_like(jumps)
@@ -601,10 +464,7 @@ class ExplicitSolver:
         rows, bonds = self.row_of[p], self.dynamics.bonds
         nodes = np.flatnonzero(rows >= 0)
         nodes = nodes[bonds.active[rows[nodes]]]
-        at = rows[nodes]
-        top, one = bonds.top[at], np.ones(len(at))
-        back = np.divide(bonds.low[at], top, out=one, where=top > 0.0)
-        return nodes, (1.0 - top / bonds.final[at]) * np.clip(back, 0.0, 1.0)
+        return nodes, bonds.remaining(rows[nodes])
 
     def vectors(self, p: int, nodes: Ints, values: Array) -> Array:
         """Jump or force components at slave nodes, shape (...,), as global vectors.
@@ -617,19 +477,13 @@ class ExplicitSolver:
         Returns:
             Shape (..., 3).
         """
-        index = self.index[p][nodes]
-        local = np.where(index >= 0, np.append(values, 0.0)[index], 0.0)
-        out = np.zeros((*index.shape[:-1], 3))
-        out[..., : self.continuum.gdim] = np.einsum(
-            "...ck,...k->...c", self.frames[p][nodes], local
-        )
-        return out
+        return global_vectors(self.index[p][nodes], self.frames[p][nodes], values)
 
     def displacements_of(self, where: list[Ints]) -> Array:
         """Mean displacements of sets of owned nodes, shape (n_sets, gdim); collective."""
         u = self.continuum.layout.displacements(self.bodies.u.x.array[: self.continuum.n_local])
         sums = [[*u[nodes].sum(axis=0), len(nodes)] for nodes in where]
-        flat = np.array(self._sum(*np.ravel(sums))).reshape(len(where), -1)
+        flat = np.array(sums_over_ranks(self.comm, *np.ravel(sums))).reshape(len(where), -1)
         return np.asarray(flat[:, :-1] / flat[:, -1:])
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:

@@ -23,6 +23,7 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.equilibrium.discrete_gradient import softening_force
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair
+from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
 
 SWEEPS = 200
 """Sweeps, at most, over nodes that share masters; those of stiff bonds take many."""
@@ -47,67 +48,6 @@ class InterfaceEnergies:
     contact: float = 0.0
     friction: float = 0.0
     ties: float = 0.0
-
-
-@dataclass(frozen=True)
-class Fading:
-    """A bond force that falls with time alone: over increments, or with a viscosity.
-
-    Attributes:
-        rows: Rows of the interface, shape (n,).
-        force: Force on the slaves at debonding, shape (n, gdim), force.
-        increments: Increments until nothing is left; 0 where a viscosity decides.
-        viscosity: mu: what is left is multiplied by mu/(mu + dt) in each increment, time.
-        age: Increments since debonding.
-    """
-
-    rows: Ints
-    force: Array
-    increments: int
-    viscosity: float
-    age: int = 0
-
-
-@dataclass
-class SofteningBonds:
-    """Laws of the bonds that soften, one entry for each row of the interface.
-
-    Attributes:
-        active: Whether the bond still softens, shape (n_rows,).
-        strength: F0, force.
-        final: w_f, length.
-        low: Opening in the middle of the last increment, length.
-        top: Largest one so far, length.
-        direction: Direction of the opening, shape (n_rows, gdim).
-        spent: Energy the bond has taken, force times length.
-        area: Area that its release sweeps, length^2; 0 before.
-        freed: Whether the bond has softened and is free, shape (n_rows,).
-    """
-
-    active: Bools
-    strength: Array
-    final: Array
-    low: Array
-    top: Array
-    direction: Array
-    spent: Array
-    area: Array
-    freed: Bools
-
-    @classmethod
-    def none(cls, n: int, gdim: int) -> SofteningBonds:
-        """No bond of n rows softens."""
-        return cls(
-            active=np.zeros(n, dtype=bool),
-            strength=np.zeros(n),
-            final=np.zeros(n),
-            low=np.zeros(n),
-            top=np.zeros(n),
-            direction=np.zeros((n, gdim)),
-            spent=np.zeros(n),
-            area=np.zeros(n),
-            freed=np.zeros(n, dtype=bool),
-        )
 
 
 @dataclass
@@ -289,12 +229,8 @@ class InterfaceDynamics:
         place[lumped.open] = np.arange(len(lumped.open))
         rows, forces = [], []
         for f in self.fading:
-            if f.increments:
-                left = 1.0 - (f.age + 1) / f.increments
-            else:
-                left = (f.viscosity / (f.viscosity + dt)) ** (f.age + 1)
             rows.append(place[f.rows])
-            forces.append(left * f.force)
+            forces.append(f.left(dt) * f.force)
         at, force = np.concatenate(rows), np.concatenate(forces)
         acting.fading = at, force
         out = np.zeros_like(self.gap)
@@ -446,7 +382,7 @@ class InterfaceDynamics:
         if acting.softening is not None:
             self._follow_bonds(acting, work, dt)
         if self.fading:
-            self.fading = _older(self.fading, dt)
+            self.fading = older(self.fading, dt)
         self.u += dt * self.v
 
     def _account(self, acting: _Acting, way: Array) -> None:
@@ -501,23 +437,4 @@ def _settled(now: Array, before: Array) -> bool:
     return bool(np.abs(now - before).max(initial=0.0) <= _SETTLED * np.abs(now).max(initial=0.0))
 
 
-_SPENT = 1e-12
-"""Bonds of which less than this fraction of the force is left are free."""
-
-
-def _older(fading: list[Fading], dt: float) -> list[Fading]:
-    """Fading bonds one increment later, without those that have ended."""
-    out = []
-    for f in fading:
-        age = f.age + 1
-        left = (
-            1.0 - age / f.increments
-            if f.increments
-            else ((f.viscosity / (f.viscosity + dt)) ** age)
-        )
-        if left > _SPENT:
-            out.append(Fading(f.rows, f.force, f.increments, f.viscosity, age))
-    return out
-
-
-__all__ = ["Fading", "InterfaceDynamics", "InterfaceEnergies", "SofteningBonds"]
+__all__ = ["InterfaceDynamics", "InterfaceEnergies"]

@@ -14,12 +14,8 @@ from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import FileOrder
-from fxcrack.solvers.explicit_interface import (
-    Fading,
-    InterfaceDynamics,
-    InterfaceEnergies,
-    SofteningBonds,
-)
+from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds
+from fxcrack.solvers.explicit_interface import InterfaceDynamics, InterfaceEnergies
 
 Arrays = dict[str, npt.NDArray[Any]]
 _SAME = 1e-9
@@ -127,6 +123,31 @@ class MotionFiles:
         self._continuum = continuum
         self._order = FileOrder(continuum.mesh.domain)
         self._field = fem.Function(continuum.space)
+
+    def arrays(self, saved: MotionSnapshot) -> Arrays:
+        """A state as plain arrays; collective.
+
+        Returns:
+            displacement, velocity and positions of all nodes in the order of the input, on rank 0;
+            motion, the numbers of the state; interfaces.*, bonds and energies by row.
+        """
+        out: Arrays = {
+            "displacement": self.gather(saved.u),
+            "velocity": self.gather(saved.v),
+            "positions": self.positions(),
+            "motion": np.array([saved.at, saved.last_dt, *saved.sums, saved.increments]),
+        }
+        return out | {f"interfaces.{k}": v for k, v in saved.interfaces.arrays().items()}
+
+    def snapshot(self, arrays: Arrays) -> MotionSnapshot:
+        """The state that :meth:`arrays` were made of, on any number of ranks; collective."""
+        at, last_dt, work, damped, initial, increments = arrays["motion"].astype(float).tolist()
+        part = {k.removeprefix("interfaces."): v for k, v in arrays.items() if "interfaces." in k}
+        return MotionSnapshot(
+            self.scatter(arrays["displacement"]), self.scatter(arrays["velocity"]),
+            InterfaceSnapshot.from_arrays(part), at, last_dt, (work, damped, initial),
+            int(increments),
+        )  # fmt: skip
 
     def gather(self, owned: Array) -> Array:
         """Values of the owned dofs in the order of the input, on rank 0; collective."""

@@ -29,7 +29,7 @@ from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.friction_state import release_to_contact
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState, allow_contact
 from fxcrack.interface.front import Front
-from fxcrack.interface.jump_coordinates import JumpCoordinates
+from fxcrack.interface.jump_coordinates import JumpCoordinates, global_vectors
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.base import Solver
@@ -390,13 +390,7 @@ class InterfaceSolver(ABC):
         Returns:
             Shape (..., 3); zero where a component is not retained.
         """
-        index = self.index[p][nodes]
-        local = np.where(index >= 0, values[np.maximum(index, 0)], 0.0)
-        out = np.zeros((*index.shape[:-1], 3))
-        out[..., : self.continuum.gdim] = np.einsum(
-            "...ck,...k->...c", self.frames[p][nodes], local
-        )
-        return out
+        return global_vectors(self.index[p][nodes], self.frames[p][nodes], values)
 
     def components(self, p: int, nodes: Ints) -> Ints:
         """Numbers of the retained jumps of slave nodes, shape (k,)."""

@@ -17,6 +17,8 @@ import numpy as np
 from mpi4py import MPI
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
+from fxcrack.solvers.options import ExplicitOptions
 
 STEPS = 24
 """Lanczos steps; enough for a quarter of a percent on even and uneven meshes."""
@@ -85,10 +87,30 @@ class HighestFrequency:
         return float(self._comm.allreduce(float(x @ y), op=MPI.SUM))
 
 
+def chosen_increment(options: ExplicitOptions, stable: float) -> float:
+    """The increment that a step asks for, time.
+
+    Args:
+        options: Controls of the step.
+        stable: Largest stable increment.
+
+    Raises:
+        InputError: The increment asked for is not stable.
+    """
+    if options.dt is None:
+        return options.safety * stable
+    if options.dt > stable:
+        raise InputError(
+            f"Explicit: dt = {options.dt:g} is above the largest stable increment "
+            f"{stable:g}; leave dt out, or let mass be added with mass_scale='dt'"
+        )
+    return float(options.dt)
+
+
 def rounded_down(value: float) -> float:
     """A positive number cut after its tenth digit: round-off of sums over ranks is gone."""
     digits = 9 - int(np.floor(np.log10(value)))
     return float(np.floor(value * 10.0**digits) / 10.0**digits)
 
 
-__all__ = ["STEPS", "HighestFrequency", "rounded_down", "start_vector"]
+__all__ = ["STEPS", "HighestFrequency", "chosen_increment", "rounded_down", "start_vector"]

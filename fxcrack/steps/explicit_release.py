@@ -20,7 +20,7 @@ from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues
 from fxcrack.criteria.mixed_mode import least_critical
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.explicit import ExplicitSolver
-from fxcrack.solvers.explicit_interface import Fading
+from fxcrack.solvers.explicit_bonds import Fading
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.debond import Debond
 

@@ -93,11 +93,11 @@ def explicit_row(
     if scaled is not None:
         row["mass_scaling_energy"] = scaled
     row["external_work"] = work
-    if solver.initial_energy:
-        row["initial_energy"] = solver.initial_energy
+    if solver.energies.initial:
+        row["initial_energy"] = solver.energies.initial
     row |= spent
     row["dt"] = solver.dt
-    row["balance"] = work + solver.initial_energy - sum(stored.values()) - sum(spent.values())
+    row["balance"] = work + solver.energies.initial - sum(stored.values()) - sum(spent.values())
     return row
 
 

@@ -1,0 +1,54 @@
+"""Velocity of the nodes at the start of explicit dynamics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.continuum import Continuum
+
+_INSIDE = 1e-9
+"""Part of the way to the middle of its cells at which a node's velocity is looked up."""
+
+
+def starting_velocity(continuum: Continuum, velocity: Sequence[Any] | None) -> Array:
+    """Velocity of the owned dofs, shape (n_local,), length/time.
+
+    Args:
+        continuum: Displacement space; first order.
+        velocity: A number or a function of position per component; ``None`` for bodies at rest.
+
+    Raises:
+        InputError: The number of components is not that of the displacement.
+    """
+    gdim = continuum.gdim
+    out = np.zeros((continuum.layout.n_owned, gdim))
+    if velocity is None:
+        return out.ravel()
+    if len(velocity) != gdim:
+        raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
+    x = _positions_within(continuum).T
+    for c, value in enumerate(velocity):
+        out[:, c] = value(x) if callable(value) else float(value)
+    return out.ravel()
+
+
+def _positions_within(continuum: Continuum) -> Array:
+    """Positions of the owned nodes, by a trifle inside their own body, shape (n, 3).
+
+    The two nodes at one place of an interface belong to bodies that may move differently.
+    """
+    x, cells = continuum.positions(), continuum.space.dofmap.list
+    middle, count = np.zeros_like(x), np.zeros(len(x))
+    np.add.at(middle, cells, x[cells].mean(axis=1)[:, None])
+    np.add.at(count, cells, 1.0)
+    n = continuum.layout.n_owned
+    inside = middle[:n] / np.maximum(count[:n], 1.0)[:, None]
+    return np.asarray(x[:n] + _INSIDE * (inside - x[:n]))
+
+
+__all__ = ["starting_velocity"]

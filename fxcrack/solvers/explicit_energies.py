@@ -1,0 +1,90 @@
+"""Energies of bodies in explicit dynamics, in the middle of increments.
+
+    T = 1/2 v . M v,    U = 1/2 u^n . f_int(u^{n+1})
+
+of linear bodies; of nonlinear ones U is the mean of the energies stored at both ends, less
+dt/4 v . (f_int(u^{n+1}) - f_int(u^n)).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from mpi4py import MPI
+
+from fxcrack.base.arrays import Array
+from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.solvers.explicit_mass import ScaledMass
+
+
+def sums_over_ranks(comm: MPI.Intracomm, *parts: float) -> list[float]:
+    """Sums of numbers that each rank has a part of; collective."""
+    values = np.array(parts, dtype=float)  # bincount of nothing gives integers
+    if comm.size > 1:
+        comm.Allreduce(MPI.IN_PLACE, values)
+    return [float(x) for x in values]
+
+
+class MotionEnergies:
+    """Energies that went in and out so far; every rank holds its part of the first two.
+
+    Args:
+        comm: Communicator of the bodies.
+
+    Attributes:
+        work: Of supports and loads.
+        damped: Dissipated by damping.
+        initial: Stored at the start, that of all ranks.
+    """
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        self._comm = comm
+        self.work = self.damped = self.initial = 0.0
+
+    def totals(self) -> tuple[float, float, float]:
+        """Work, damping and energy at the start of all ranks; collective."""
+        work, damped = sums_over_ranks(self._comm, self.work, self.damped)
+        return work, damped, self.initial
+
+    def restore(self, totals: tuple[float, float, float]) -> None:
+        """Take what :meth:`totals` gave."""
+        mine = float(self._comm.rank == 0)
+        self.work, self.damped, self.initial = mine * totals[0], mine * totals[1], totals[2]
+
+
+def stored_energies(
+    bodies: InternalForces, mass: ScaledMass, velocity: Array, dt: float
+) -> dict[str, float]:
+    """Strain and kinetic energy in the middle of the last increment, by name; collective.
+
+    Args:
+        bodies: The bodies at its end.
+        mass: Their mass; what scaling has added to it has an entry of its own.
+        velocity: Velocity in its middle, owned dofs, shape (n_local,), length/time.
+        dt: Its length, time; 0 before the first one.
+    """
+    comm, n = bodies.continuum.comm, len(velocity)
+    square = velocity * velocity
+    kinetic, added = 0.5 * float(mass.values @ square), 0.5 * float(mass.added @ square)
+    now = bodies.u.x.array[:n].copy()
+    if bodies.linear:
+        strain = 0.5 * float((now - dt * velocity) @ bodies.forces())
+    else:
+        strain = 0.0
+        force = bodies.forces().copy()
+        energy = bodies.stored()
+        if dt > 0.0:
+            bodies.u.x.array[:n] = now - dt * velocity
+            bodies.u.x.scatter_forward()
+            energy = 0.5 * (energy + bodies.stored())
+            strain = -0.25 * dt * float((force - bodies.forces()) @ velocity)
+            bodies.u.x.array[:n] = now
+            bodies.u.x.scatter_forward()
+        strain += energy / comm.size
+    strain, kinetic, added = sums_over_ranks(comm, strain, kinetic, added)
+    out = {"strain_energy": strain, "kinetic_energy": kinetic}
+    if mass.is_scaled:
+        out["mass_scaling_energy"] = added
+    return out
+
+
+__all__ = ["MotionEnergies", "stored_energies", "sums_over_ranks"]

@@ -1,0 +1,90 @@
+"""Loads and monitored displacements in explicit dynamics, as vectors on the owned dofs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fxcrack.base.arrays import Array
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.load_vectors import LoadPattern, load_vector, monitor_weights
+from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.interface.lumped import LumpedInterface
+
+
+class LoadsAndMonitors:
+    """Force patterns and monitored displacements; collective.
+
+    Args:
+        continuum: Displacement space.
+        loads: Force patterns.
+        monitors: Monitored displacements.
+
+    Raises:
+        InputError: A load or a monitor does not fit the bodies.
+    """
+
+    def __init__(
+        self, continuum: Continuum, loads: Sequence[Load], monitors: Sequence[Monitor]
+    ) -> None:
+        self._n_local = continuum.n_local
+        self._loads = [_load_pattern(continuum, load) for load in loads]
+        self._monitors = [LoadPattern(monitor_weights(continuum, m)) for m in monitors]
+        self._on_faces: list[Array] = []
+
+    def take_faces(self, lumped: LumpedInterface) -> bool:
+        """Find the forces of loads on slave nodes; whether there are any.
+
+        Args:
+            lumped: The interfaces.
+        """
+        nodes, n = lumped.nodes, self._n_local
+        found = [nodes.gather(p.dense(n))[lumped.slave] for p in self._loads]
+        has = any(np.any(f) for f in found)
+        self._on_faces = found if has else []
+        return has
+
+    def add_to(self, force: Array, factors: Array) -> None:
+        """Add the loads to forces on the owned dofs, shape (n_local,), in place.
+
+        Args:
+            force: The forces.
+            factors: Load factors, shape (n_forces,).
+        """
+        for pattern, factor in zip(self._loads, factors.tolist(), strict=True):
+            if factor:
+                pattern.add(force, factor)
+
+    def on_faces(self, factors: Array) -> Array:
+        """Forces on the slave nodes, shape (n_rows, gdim), force."""
+        return sum(
+            (factor * f for factor, f in zip(factors.tolist(), self._on_faces, strict=True)),
+            np.zeros(1),
+        )
+
+    def power(self, factors: Array, velocity: Array) -> float:
+        """Power of the loads in a motion of the owned dofs, this rank's part."""
+        return sum(
+            float(factor) * float(p.values @ velocity[p.at])
+            for p, factor in zip(self._loads, factors, strict=True)
+            if factor
+        )
+
+    def conjugates(self, u: Array) -> list[float]:
+        """Displacements conjugate to the loads, length; this rank's part of each."""
+        return [float(p.values @ u[p.at]) for p in self._loads]
+
+    def monitored(self, u: Array) -> list[float]:
+        """Monitored displacements, length; this rank's part of each."""
+        return [float(p.values @ u[p.at]) for p in self._monitors]
+
+
+def _load_pattern(continuum: Continuum, load: Load) -> LoadPattern:
+    vector = load_vector(continuum, load)
+    out = LoadPattern(np.array(vector.array_r))
+    vector.destroy()
+    return out
+
+
+__all__ = ["LoadsAndMonitors"]
