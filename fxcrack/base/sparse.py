@@ -1,7 +1,7 @@
-"""Products of sparse matrices that add to an array in place: one compiled call, nothing allocated.
+"""Products of sparse matrices that add to an array in place: one compiled call, no new array.
 
-In explicit dynamics an increment of a small model is a few dozen such calls; those of ``A @ x`` cost
-ten times as much for a small matrix, in checks and in arrays for the results.
+An increment of a small model of explicit dynamics is a few dozen such calls; ``A @ x`` costs
+ten times as much for a small matrix, in checks and in an array for the result.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg.blas import daxpy
 from scipy.sparse import _sparsetools
 
 from fxcrack.base.arrays import Array
@@ -60,9 +61,15 @@ class Product:
         return sp.csr_matrix((self.data, self._columns, self._starts), shape=self.shape)
 
 
+def add_multiple(y: Array, factor: float, x: Array) -> None:
+    """Add factor x to y in place, in one pass through memory; both contiguous, shape (n,)."""
+    if len(y):
+        daxpy(x, y, a=factor)
+
+
 def by_component(matrix: Any, n: int) -> sp.csr_matrix:
     """A matrix on nodes as one on n components of each of them, node by node."""
     return sp.kron(matrix, sp.identity(n, format="csr"), format="csr")
 
 
-__all__ = ["Product", "by_component"]
+__all__ = ["Product", "add_multiple", "by_component"]

@@ -254,6 +254,19 @@ class LumpedInterface:
         picks = sp.csr_matrix((np.ones(m), (np.arange(m), self.slave[rows])), shape=(m, n))
         return sp.csr_matrix(picks - self.weights[rows])
 
+    def mean_jumps(self, rows: Ints, weights: Array) -> sp.csr_matrix:
+        """Weighted means of jumps by the motion of the nodes, on nodes, (n, n_nodes).
+
+        Args:
+            rows: Shape (n, k).
+            weights: Same shape; rows of weight 0 need not exist.
+        """
+        out = sp.csr_matrix((len(rows), len(self.nodes)))
+        for k in range(rows.shape[1]):
+            at = np.where(weights[:, k] != 0.0, rows[:, k], 0)
+            out = out + sp.diags(weights[:, k]) @ self.separations(at)
+        return sp.csr_matrix(out)
+
     def jumps_along(self, rows: Ints, directions: Array) -> sp.csr_matrix:
         """Jumps of some rows along one direction each by the motion of the nodes.
 
@@ -367,18 +380,18 @@ class LumpedInterface:
             return np.asarray(values[self._open_slaves] - values[self._open_masters])
         return np.asarray(self._jump @ values)
 
-    def push(self, total: Array, forces: Array) -> None:
-        """Add forces on the slave side of the open rows, and their reactions, in place.
+    def on_nodes(self, forces: Array) -> Array:
+        """Forces on the slave side of the open rows and their reactions, shape (n_nodes, gdim).
 
         Args:
-            total: Forces on the nodes after :meth:`collect`, shape (n_nodes, gdim).
             forces: Shape (n_open, gdim).
         """
-        if self.simple:
-            total[self._open_slaves] += forces
-            total[self._open_masters] -= forces
-        else:
-            total += self.collect(self._jump_t @ forces)
+        if not self.simple:
+            return np.asarray(self._jump_t @ forces)
+        out = np.zeros((len(self.nodes), forces.shape[1]))
+        out[self._open_slaves] = forces
+        out[self._open_masters] = -forces
+        return out
 
     def response(self, forces: Array) -> Array:
         """Acceleration of the open jumps by forces on all of them, shape (n_open, gdim)."""

@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_mass import ScaledMass
 
 
@@ -52,12 +53,13 @@ class MotionEnergies:
 
 
 def stored_energies(
-    bodies: InternalForces, mass: ScaledMass, velocity: Array, dt: float
+    bodies: InternalForces, motion: BodyMotion, mass: ScaledMass, velocity: Array, dt: float
 ) -> dict[str, float]:
     """Strain and kinetic energy in the middle of the last increment, by name; collective.
 
     Args:
         bodies: The bodies at its end.
+        motion: Their internal forces.
         mass: Their mass; what scaling has added to it has an entry of its own.
         velocity: Velocity in its middle, owned dofs, shape (n_local,), length/time.
         dt: Its length, time; 0 before the first one.
@@ -67,7 +69,7 @@ def stored_energies(
     kinetic, added = 0.5 * float(mass.values @ square), 0.5 * float(mass.added @ square)
     now = bodies.u.x.array[:n].copy()
     if bodies.linear:
-        strain = 0.5 * float((now - dt * velocity) @ bodies.forces())
+        strain = 0.5 * float((now - dt * velocity) @ motion.whole())
     else:
         strain = 0.0
         force = bodies.forces().copy()
