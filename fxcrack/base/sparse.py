@@ -13,14 +13,14 @@ import scipy.sparse as sp
 from scipy.linalg.blas import daxpy
 from scipy.sparse import _sparsetools
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Ints
 
 
 class Product:
     """y += A x with a matrix in compressed rows.
 
     Args:
-        matrix: A, shape (n, m).
+        matrix: A, shape (n, m), of scipy.
 
     Attributes:
         shape: Shape of A.
@@ -34,6 +34,45 @@ class Product:
         self.shape: tuple[int, int] = rows.shape
         self._starts, self._columns = rows.indptr, rows.indices
         self.data: Array = np.ascontiguousarray(rows.data, dtype=np.float64)
+
+    @classmethod
+    def of_rows(cls, columns: Ints, data: Array, width: int) -> Product:
+        """A matrix with as many entries in every row.
+
+        Args:
+            columns: Shape (n, k).
+            data: Entries, same shape.
+            width: m.
+        """
+        out = cls.__new__(cls)
+        n, k = columns.shape
+        out.shape = n, width
+        out._starts = np.arange(0, n * k + 1, max(k, 1), dtype=np.int32)[: n + 1]
+        if not k:
+            out._starts = np.zeros(n + 1, dtype=np.int32)
+        out._columns = columns.astype(np.int32).ravel()
+        out.data = np.ascontiguousarray(data, dtype=np.float64).ravel()
+        return out
+
+    @classmethod
+    def of_columns(cls, rows: Ints, data: Array, height: int) -> Product:
+        """A matrix with as many entries in every column.
+
+        Args:
+            rows: Shape (m, k).
+            data: Entries, same shape.
+            height: n.
+        """
+        out = cls.__new__(cls)
+        m, k = rows.shape
+        out.shape = height, m
+        flat = rows.ravel()
+        order = np.argsort(flat, kind="stable")
+        out._starts = np.zeros(height + 1, dtype=np.int32)
+        np.cumsum(np.bincount(flat, minlength=height), out=out._starts[1:])
+        out._columns = np.repeat(np.arange(m, dtype=np.int32), k)[order]
+        out.data = np.ascontiguousarray(data, dtype=np.float64).ravel()[order]
+        return out
 
     def add(self, x: Array, y: Array) -> None:
         """Add A x to y.

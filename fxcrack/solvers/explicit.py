@@ -79,7 +79,6 @@ class ExplicitSolver:
     Attributes:
         Those of :class:`fxcrack.solvers.base.AnySolver`, and
         bodies: Internal forces, with the displacement.
-        velocity: In the middle of the last increment, shape (n_local,), length/time.
         mass: Mass of the owned dofs, and what mass scaling has added to it.
         energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
@@ -112,7 +111,8 @@ class ExplicitSolver:
         self.around = [(0.0, 0.0)] * len(pairs)
         self.bodies = InternalForces(continuum, terms)
         self.mass = ScaledMass(lumped_mass(continuum, effect))
-        self.velocity = starting_velocity(continuum, effect.velocity)
+        self._velocity = starting_velocity(continuum, effect.velocity)
+        self._velocity_whole = True  # at interface nodes as well
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
@@ -123,6 +123,7 @@ class ExplicitSolver:
         self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass.values)
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
+        self._owned = self.bodies.u.x.array[: continuum.n_local]  # displacement of the owned dofs
         self._next = np.zeros(continuum.n_local)  # velocity of the present increment
         chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
@@ -158,7 +159,15 @@ class ExplicitSolver:
         self._bonds_known = False
         self._any_held = bool(lumped.held.any())
         self._has_face_loads = self._outer.take_faces(lumped)
-        self.dynamics.v = nodes.gather(self.velocity)
+        self.dynamics.v = nodes.gather(self._velocity)
+
+    @property
+    def velocity(self) -> Array:
+        """In the middle of the last increment, owned dofs, shape (n_local,), length/time."""
+        if not self._velocity_whole and len(self._at_interface):
+            self._velocity[self._at_interface] = self.dynamics.v[self._mine].ravel()
+        self._velocity_whole = True
+        return self._velocity
 
     # -- a step begins -------------------------------------------------------------------
 
@@ -257,9 +266,9 @@ class ExplicitSolver:
         if self._damping:
             at, rate = self._chosen, self._damping
             chosen -= rate * self.mass.values[at] * self.velocity[at]
-            np.multiply(self.velocity, 1.0 - h * rate, out=following)
+            np.multiply(self._velocity, 1.0 - h * rate, out=following)
         else:
-            np.copyto(following, self.velocity)
+            np.copyto(following, self._velocity)
         self.motion.add_change(following, h)
         self._outer.add_elsewhere(following, self._loads, h)
         t1 = clock.perf_counter()
@@ -322,17 +331,20 @@ class ExplicitSolver:
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
         start = clock.perf_counter()
-        h, dt, v, following = self._h, self.dt, self.velocity, self._next
-        n = self.continuum.n_local
-        u = self.bodies.u.x.array[:n]
+        h, dt, v, following = self._h, self.dt, self._velocity, self._next
+        u = self._owned
         prescribed, dynamics, energies = self.prescribed, self.dynamics, self.energies
         given = prescribed.velocities(u, self._coordinates, dt)
         reactions = self._reactions_to(given)
         old = prescribed.motion(v, dynamics.v)
+        at, mine = self._at_interface, self._mine
+        # loads, damping and the first energy look at all dofs
+        whole = bool(self.loads) or self._damping > 0.0 or not self.increments
+        if whole:
+            v = self.velocity
         dynamics.advance(h, dt)
         following[prescribed.dofs] = given
-        at, mine = self._at_interface, self._mine
-        if len(at):
+        if whole and len(at):
             following[at] = dynamics.v[mine].ravel()
         power = float(reactions @ (old + prescribed.motion(following, dynamics.v)))
         if self.loads:
@@ -346,7 +358,7 @@ class ExplicitSolver:
             # the strain energy of the first half increment looks ahead to the whole of it
             more = 0.25 * dt * float(self._first @ (following - v))
             energies.initial += sums_over_ranks(self.comm, more)[0]
-        self.velocity, self._next = following, v
+        self._velocity, self._next, self._velocity_whole = following, v, whole
         add_multiple(u, dt, following)
         if len(at):
             u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
@@ -363,13 +375,14 @@ class ExplicitSolver:
 
         Between :meth:`begin` and :meth:`finish`. Shape (n_prescribed,), force.
         """
-        u = self.bodies.u.x.array[: self.continuum.n_local]
-        return self._reactions_to(self.prescribed.velocities(u, self._coordinates, self.dt))
+        return self._reactions_to(
+            self.prescribed.velocities(self._owned, self._coordinates, self.dt)
+        )
 
     def _reactions_to(self, velocities: Array) -> Array:
         """Reactions where dofs within the bodies are given velocities, shape (n_dofs,)."""
         prescribed, dofs = self.prescribed, self.prescribed.dofs
-        acceleration = (velocities - self.velocity[dofs]) / self._h
+        acceleration = (velocities - self._velocity[dofs]) / self._h
         within = self.mass.values[dofs] * acceleration - self._at_chosen[len(self._at_interface) :]
         if not prescribed.holds_nodes:
             return within

@@ -30,6 +30,7 @@ class BodyMotion:
     def __init__(self, bodies: InternalForces, chosen: Ints) -> None:
         self._bodies, self._chosen = bodies, chosen
         n = bodies.continuum.n_local
+        self._u = bodies.u.x.array
         self._others = np.ones(n, dtype=bool)
         self._others[chosen] = False
         self._h = 0.0
@@ -65,7 +66,7 @@ class BodyMotion:
         """
         self._bodies.evaluations += 1
         if self._rows is not None:
-            self._rows.into(self._bodies.u.x.array, out)
+            self._rows.into(self._u, out)
             return
         self._forces = self._bodies.forces()
         np.take(self._forces, self._chosen, out=out)
@@ -81,7 +82,7 @@ class BodyMotion:
             if h != self._h:
                 self._change.data *= h / self._h
                 self._h = h
-            self._change.add(self._bodies.u.x.array, velocity)
+            self._change.add(self._u, velocity)
             return
         assert self._forces is not None
         if h != self._h:
@@ -96,7 +97,7 @@ class BodyMotion:
         """
         if self._change is None or self._rows is None:
             return self._bodies.forces().copy()
-        u = self._bodies.u.x.array
+        u = self._u
         out = self._change(u)
         out *= -1.0 / (self._h * self._per_mass)
         out[self._chosen] = self._rows(u)

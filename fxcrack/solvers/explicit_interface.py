@@ -76,7 +76,7 @@ class ChosenBonds:
     """
 
     by_forces: Product
-    by_motion: Product
+    by_motion: Product | None
 
 
 class InterfaceDynamics:
@@ -182,7 +182,8 @@ class InterfaceDynamics:
         """Tie some rows, shape (n_rows,), and prepare what depends on that."""
         lumped = self.lumped
         lumped.set_ties(tied)
-        self._fixed_push = Product(lumped.following[:, self._fixed])
+        if len(self._fixed):
+            self._fixed_push = Product(lumped.following[:, self._fixed])
         self.set_frames()
 
     def set_frames(self) -> None:
@@ -195,9 +196,7 @@ class InterfaceDynamics:
         # prescribed on all sides along the normal: no force could keep such a pair apart
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
         self._may_touch = np.flatnonzero(may_touch)
-        self._closing = Product(
-            lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
-        )
+        self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
         self._gap = lumped.gap[rows] if np.any(lumped.gap[rows]) else None
         self._closing_gap = lumped.gap[rows[self._may_touch]]
         self._gaps = np.zeros(len(self._may_touch))
@@ -510,14 +509,13 @@ class InterfaceDynamics:
 
     def chosen_bonds(self, rows: Ints) -> ChosenBonds:
         """Prepare :meth:`bonds_at` for some tied rows, shape (n,)."""
-        forces, motion = self.lumped.bonds_of(rows)
-        return ChosenBonds(Product(forces), Product(motion[:, self._fixed]))
+        return ChosenBonds(*self.lumped.bonds_of(rows, self._fixed))
 
     def bonds_at(self, chosen: ChosenBonds) -> Array:
         """Bond forces on the slaves of chosen rows, shape (n gdim,), force."""
         more = self._more
         out = chosen.by_forces(self._forces if more is None else self._forces + more)
-        if len(self._fixed):
+        if chosen.by_motion is not None:
             chosen.by_motion.add(self._given, out)
         return out
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.sparse import Product
 from fxcrack.equilibrium.discrete_gradient import force_of_one, softening_force
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.solvers.explicit_bonds import SofteningBonds
@@ -40,10 +39,8 @@ class LiveBonds:
         self._bonds = bonds
         self.rows = k = np.flatnonzero(bonds.active & ~lumped.tied)
         self.direction = bonds.direction[k]
-        along = lumped.jumps_along(k, self.direction)
-        push = lumped.accelerations.matrix() @ along.T
-        self.along, self.push = Product(along), Product(push)
-        self.coupling = (along @ push).toarray()
+        self.along = lumped.jumps_along(k, self.direction)
+        self.push, self.coupling = lumped.pull_along(k, self.direction)
         self.coupled = not lumped.simple
         self._strength, self._final = bonds.strength[k], bonds.final[k]
         self._numbers = list(zip(self._strength.tolist(), self._final.tolist(), strict=True))

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.sparse import Product, by_component
+from fxcrack.base.sparse import Product
 from fxcrack.criteria import ProgressiveRelease, ReleaseLaw
 from fxcrack.criteria.closure_lengths import uneven
 from fxcrack.criteria.crack_closure import closure_weights
@@ -86,8 +86,7 @@ class ReleaseControl:
             behind = lumped.mean_jumps(row_of[tips.wake_nodes[:, 0]], tips.wake_weights[:, 0])
             self._screen = _Screen(
                 tips, self._solver.dynamics.chosen_bonds(row_of[tips.node]),
-                Product(by_component(behind, self._solver.continuum.gdim)),
-                self._bounds(tips), version,
+                behind, self._bounds(tips), version,
             )  # fmt: skip
         return self._screen
 
