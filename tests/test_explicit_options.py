@@ -207,3 +207,13 @@ def test_fields_bonds_and_explanation(tmp_path: Path) -> None:
     for word in ("explicit", "increment", "operator"):
         assert word in text, text
     scene.close()
+
+
+def test_energies_balance_where_the_increment_changes() -> None:
+    scene = beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF))
+    for n, safety in enumerate((0.9, 0.5, 0.97)):
+        history = scene.run(until(scene, 40.0, 1e-4 + 2e-5 * n, rows=10, safety=safety))
+    scene.close()
+    assert history["dt"].max() / history["dt"].min() == pytest.approx(0.97 / 0.5, rel=0.05)
+    assert abs(history["dt_energy"][-1]) > 1e-6 * history["external_work"][-1]
+    assert imbalance(history) <= 1e-10

@@ -124,7 +124,6 @@ class ExplicitSolver:
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
         self._owned = self.bodies.u.x.array[: continuum.n_local]  # displacement of the owned dofs
-        self._next = np.zeros(continuum.n_local)  # velocity of the present increment
         chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
         self.motion = BodyMotion(self.bodies, chosen)
@@ -257,20 +256,15 @@ class ExplicitSolver:
         columns = len(self.supports.columns)
         self._h = 0.5 * (self.last_dt + self.dt)
         self._now, self._loads, self._coordinates = now, now[columns:], then[:columns]
-        h, chosen, following = self._h, self._at_chosen, self._next
-        self.motion.forces(chosen)
+        chosen = self._at_chosen
+        self.motion.forces(chosen, self._h)
         np.negative(chosen, out=chosen)
-        if not self.increments:
-            self._first = self.motion.whole()
+        if self.dt != self.last_dt:
+            self._internal = self.motion.whole()
         self._outer.add_at_chosen(chosen, self._loads)
         if self._damping:
-            at, rate = self._chosen, self._damping
-            chosen -= rate * self.mass.values[at] * self.velocity[at]
-            np.multiply(self._velocity, 1.0 - h * rate, out=following)
-        else:
-            np.copyto(following, self._velocity)
-        self.motion.add_change(following, h)
-        self._outer.add_elsewhere(following, self._loads, h)
+            at = self._chosen
+            chosen -= self._damping * self.mass.values[at] * self.velocity[at]
         t1 = clock.perf_counter()
         if len(self.lumped.nodes):
             mine = chosen[: len(self._at_interface)]
@@ -331,35 +325,42 @@ class ExplicitSolver:
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
         start = clock.perf_counter()
-        h, dt, v, following = self._h, self.dt, self._velocity, self._next
-        u = self._owned
+        h, dt, u = self._h, self.dt, self._owned
         prescribed, dynamics, energies = self.prescribed, self.dynamics, self.energies
         given = prescribed.velocities(u, self._coordinates, dt)
         reactions = self._reactions_to(given)
-        old = prescribed.motion(v, dynamics.v)
         at, mine = self._at_interface, self._mine
-        # loads, damping and the first energy look at all dofs
-        whole = bool(self.loads) or self._damping > 0.0 or not self.increments
-        if whole:
-            v = self.velocity
+        # loads, damping and changes of the increment look at all dofs
+        whole = bool(self.loads) or self._damping > 0.0 or dt != self.last_dt
+        v = self.velocity if whole else self._velocity
+        before = v.copy() if whole else v
+        old = prescribed.motion(v, dynamics.v)
+        if self._damping:
+            v *= 1.0 - h * self._damping
+        self.motion.add_change(v)
+        self._outer.add_elsewhere(v, self._loads, h)
         dynamics.advance(h, dt)
-        following[prescribed.dofs] = given
+        v[prescribed.dofs] = given
         if whole and len(at):
-            following[at] = dynamics.v[mine].ravel()
-        power = float(reactions @ (old + prescribed.motion(following, dynamics.v)))
+            v[at] = dynamics.v[mine].ravel()
+        power = float(reactions @ (old + prescribed.motion(v, dynamics.v)))
         if self.loads:
+            power += self._outer.power(self._loads, before)
             power += self._outer.power(self._loads, v)
-            power += self._outer.power(self._loads, following)
         energies.work += 0.5 * h * power
         if self._damping:
             rate = 0.5 * h * self._damping
-            energies.damped += rate * float((v * self.mass.values) @ (v + following))
-        if not self.increments:
-            # the strain energy of the first half increment looks ahead to the whole of it
-            more = 0.25 * dt * float(self._first @ (following - v))
-            energies.initial += sums_over_ranks(self.comm, more)[0]
-        self._velocity, self._next, self._velocity_whole = following, v, whole
-        add_multiple(u, dt, following)
+            energies.damped += rate * float((before * self.mass.values) @ (before + v))
+        if dt != self.last_dt:
+            # U of linear bodies is u^n . f_int(u^{n+1})/2: it changes with the length of increments
+            more = 0.25 * (dt - self.last_dt) * float(self._internal @ (v - before))
+            more = sums_over_ranks(self.comm, more)[0]
+            if self.increments:
+                energies.renewed -= more
+            else:
+                energies.initial += more
+        self._velocity_whole = whole
+        add_multiple(u, dt, v)
         if len(at):
             u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
         if self.comm.size > 1:
@@ -413,6 +414,8 @@ class ExplicitSolver:
             out["friction_energy"] = energies.friction
         if not self.lumped.simple:
             out["tie_energy"] = energies.ties
+        if self.energies.renewed:
+            out["dt_energy"] = self.energies.renewed
         if self._damping:
             out["damping_energy"] = self.energies.totals()[1]
         return out

@@ -35,10 +35,9 @@ class BodyMotion:
         self._others[chosen] = False
         self._h = 0.0
         self._per_mass = np.ones(n)
-        self._scale = np.zeros(n)
+        self._scale, self._changes = np.zeros(n), np.zeros(n)
         self._rows: Product | None = None
         self._change: Product | None = None
-        self._forces: Array | None = None
 
     def prepare(self, inverse_mass: Array) -> None:
         """Take the operator that was chosen, and masses.
@@ -58,37 +57,37 @@ class BodyMotion:
             self._h = 1.0
             self._bodies.forget_stiffness()
 
-    def forces(self, out: Array) -> None:
+    def forces(self, out: Array, h: float) -> None:
         """Internal forces at the chosen dofs; collective.
 
         Args:
             out: Overwritten, shape (n_chosen,), force.
+            h: Time from the last velocity to the next, for :meth:`add_change`.
         """
         self._bodies.evaluations += 1
-        if self._rows is not None:
+        if self._change is not None and self._rows is not None:
+            if h != self._h:
+                self._change.data *= h / self._h
+                self._h = h
             self._rows.into(self._u, out)
             return
-        self._forces = self._bodies.forces()
-        np.take(self._forces, self._chosen, out=out)
+        forces = self._bodies.forces()
+        np.take(forces, self._chosen, out=out)
+        if h != self._h:
+            self._scale, self._h = np.where(self._others, -h * self._per_mass, 0.0), h
+        # a copy: energies evaluate forces at other displacements in the meantime
+        np.multiply(forces, self._scale, out=self._changes)
 
-    def add_change(self, velocity: Array, h: float) -> None:
+    def add_change(self, velocity: Array) -> None:
         """Change the velocity at all dofs but the chosen ones, in place; follows :meth:`forces`.
 
         Args:
             velocity: Of the owned dofs, shape (n_local,), length/time.
-            h: Time from the last velocity to the next.
         """
         if self._change is not None:
-            if h != self._h:
-                self._change.data *= h / self._h
-                self._h = h
             self._change.add(self._u, velocity)
-            return
-        assert self._forces is not None
-        if h != self._h:
-            self._scale, self._h = np.where(self._others, -h * self._per_mass, 0.0), h
-        self._forces *= self._scale  # not needed any more, and evaluated anew next time
-        velocity += self._forces
+        else:
+            velocity += self._changes
 
     def whole(self) -> Array:
         """Internal forces at the owned dofs at the present displacement, shape (n_local,), force.

@@ -35,21 +35,24 @@ class MotionEnergies:
         work: Of supports and loads.
         damped: Dissipated by damping.
         initial: Stored at the start, that of all ranks.
+        renewed: Gone with changes of the increment, that of all ranks: energies belong to the
+            middle of increments, which a change of dt moves.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = comm
-        self.work = self.damped = self.initial = 0.0
+        self.work = self.damped = self.initial = self.renewed = 0.0
 
-    def totals(self) -> tuple[float, float, float]:
-        """Work, damping and energy at the start of all ranks; collective."""
+    def totals(self) -> tuple[float, float, float, float]:
+        """Work, damping, energy at the start and gone with changes of dt; collective."""
         work, damped = sums_over_ranks(self._comm, self.work, self.damped)
-        return work, damped, self.initial
+        return work, damped, self.initial, self.renewed
 
-    def restore(self, totals: tuple[float, float, float]) -> None:
+    def restore(self, totals: tuple[float, float, float, float]) -> None:
         """Take what :meth:`totals` gave."""
         mine = float(self._comm.rank == 0)
-        self.work, self.damped, self.initial = mine * totals[0], mine * totals[1], totals[2]
+        self.work, self.damped = mine * totals[0], mine * totals[1]
+        self.initial, self.renewed = totals[2:]
 
 
 def stored_energies(
