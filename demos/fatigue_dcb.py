@@ -40,6 +40,8 @@ Array = npt.NDArray[np.float64]
 
 A0, U_MAX, RATIO = 30.0, 0.67, 0.1
 PARIS = fx.Paris(c1=2.8461e-9, c2=-12.415, c3=2.44e6, c4=10.61, r1=0.060 / G_IC, r2=0.9)
+# What may drive growth at a load ratio R, beside dG.
+DRIVES = {"dG": "dG", "G_max": "G_max", "dK": "dK", "Walker, gamma = 0.4": fx.Walker(0.4)}
 # The arms of the beam in plane strain: E11/(1 - nu12 nu21).
 STRAIN_BEAM = replace(BEAM, E=BEAM.E / (1.0 - 0.30**2 * BEAM.E22 / BEAM.E))
 
@@ -78,7 +80,8 @@ class StaticRate:
     def cycles(self, a: npt.ArrayLike, law: fx.Paris = PARIS, ratio: float = RATIO) -> Array:
         """Cycles of growth from A0: the integral of da/(c3 dG^c4)."""
         x = np.linspace(A0, float(np.max(a)), 20001)
-        inverse = 1.0 / law.growth_rate((1.0 - ratio**2) * self(x))
+        top = self(x)
+        inverse = 1.0 / law.growth(fx.CycleRates((1.0 - ratio**2) * top, top, np.array(G_IC)))
         steps = 0.5 * (inverse[1:] + inverse[:-1]) * np.diff(x)
         return np.interp(a, x, np.concatenate([[0.0], np.cumsum(steps)]))
 
@@ -134,16 +137,18 @@ def run(
     *,
     ratio: float = RATIO,
     method: str = "closure",
+    law: fx.Paris = PARIS,
 ) -> Result:
     """Cycle until the crack arrests at the threshold."""
-    scene, _ = make_scene(dx, ny, fx.Fatigue(GIc=G_IC, paris=PARIS, method=method))
+    scene, _ = make_scene(dx, ny, fx.Fatigue(GIc=G_IC, paris=law, method=method))
     start = time.perf_counter()
     history = scene.run(fx.Cycles(maximum=U_MAX, ratio=ratio))
     seconds = time.perf_counter() - start
     scene.close()
     rows = [row for row in history if row["event"] in ("cycle", "release")]
     a, N = (np.array([row[name] for row in rows]) for name in ("a[bond]", "N"))
-    N[0] = PARIS.onset_cycles(rows[0]["dG[bond]"])
+    top, dG = np.array([rows[0]["G_max[bond]"]]), np.array([rows[0]["dG[bond]"]])
+    N[0] = law.onset(fx.CycleRates(dG, top, np.array(G_IC)))[0]
     return Result(history, a, N, seconds)
 
 
@@ -174,6 +179,19 @@ def main(out: Path, fine: bool = False) -> None:
         ["method", "element / mm", *(f"a = {a:g}" for a in at)],
         rows,
     )
+    # The same constants with other driving forces: at R = 0 all of them are G_max.
+    rows, coarser = [], static_rate(2.0 * dx, ny)
+    for name, drive in DRIVES.items():
+        law = replace(PARIS, c1=0.0, drive=drive)
+        for ratio in (0.1, 0.5):
+            other = run(2.0 * dx, ny, ratio=ratio, law=law).cycles(34.0)
+            expected = coarser.cycles(34.0, law, ratio)
+            rows.append([name, ratio, float(other), float(expected), float(other / expected)])
+    table(
+        "Cycles of growth from 30 to 34 mm by the driving force of the law",
+        ["D", "R", "N", "integral", "ratio"],
+        rows,
+    )
     found.history.to_csv(out / "fatigue_dcb.csv")
     found.history.to_json(out / "fatigue_dcb.json")
 
@@ -195,6 +213,13 @@ def main(out: Path, fine: bool = False) -> None:
         return figure
 
     save(MPI.COMM_WORLD, out / "cycles.png", draw)
+    fx.plots.paris(
+        found.history,
+        out / "paris.png",
+        "bond",
+        xlabel="Range $\\Delta G$ / (N/mm)",
+        ylabel="d$a$/d$N$ / mm",
+    )
     if MPI.COMM_WORLD.rank == 0:
         d = found.history.details
         print(

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from fxcrack import criteria
 from fxcrack.base.errors import InputError
-from fxcrack.criteria import BK, Fatigue, Paris, Regime, cycle_jump
+from fxcrack.criteria import BK, CycleJump, CycleRates, Fatigue, FatigueLaw, Paris, Regime
 
 Array = npt.NDArray[np.float64]
 
@@ -22,6 +23,12 @@ ROUND_OFF = 1e-12  # powers are taken through logarithms of moderate size
 # N0 = 100 dG^-2, da/dN = 0.01 dG^3, threshold 0.1, upper limit 0.8 of a toughness of 1
 LAW = Paris(100.0, -2.0, 0.01, 3.0, r1=0.1, r2=0.8)
 DONE: dict[str, Any] = {"initiated": True}
+
+
+def cycle_jump(law: FatigueLaw, dG: Any, G_max: Any, G_c: Any, da: Any, **more: Any) -> CycleJump:
+    """The jump of a front in mode I."""
+    return criteria.cycle_jump(law, CycleRates(dG, G_max, G_c), da, **more)
+
 
 ranges = arrays(np.float64, 5, elements=st.floats(0.11, 0.79))
 
@@ -40,7 +47,8 @@ def test_steep_laws_do_not_overflow_on_the_way() -> None:
 
 
 def test_regimes_include_their_limits() -> None:
-    got = LAW.regime([0.0, 0.1, 0.1001, 0.7999, 0.8, 5.0], 1.0)
+    top = np.array([0.0, 0.1, 0.1001, 0.7999, 0.8, 5.0])
+    got = LAW.regimes(CycleRates(top, top, np.ones(6)))
     assert got.tolist() == [
         Regime.NONE, Regime.NONE, Regime.PARIS, Regime.PARIS, Regime.UNSTABLE, Regime.UNSTABLE,
     ]  # fmt: skip
@@ -55,7 +63,9 @@ def test_extremes_of_a_cycle() -> None:
             [[0.01, 0.01, 0.0], [0.02, 0.02, 0.0]],
         ]
     )
-    dG, top, critical = criterion.cycle(rates, [0.2, 0.8, 0.8])
+    found = criterion.cycle(rates, [0.2, 0.8, 0.8])
+    dG, top, critical = found.dG, found.G_max, found.G_c
+    assert found.shear == pytest.approx([0.5, 0.25])
     assert dG == pytest.approx([0.18, 0.03])
     assert top == pytest.approx([0.2, 0.04])
     # Mode mix of the largest rate: B = 0.5 and 0.25 (first of equals).
@@ -65,7 +75,9 @@ def test_extremes_of_a_cycle() -> None:
 def test_load_ratio_of_a_linear_structure() -> None:
     criterion = Fatigue(0.2, paris=LAW)
     g = np.array([[0.1, 0.05, 0.0]])
-    dG, top, critical = criterion.cycle(np.stack([g, 0.3**2 * g]), [0.2, 0.2, 0.2])
+    found = criterion.cycle(np.stack([g, 0.3**2 * g]), [0.2, 0.2, 0.2])
+    dG, top, critical = found.dG, found.G_max, found.G_c
+    assert found.R == pytest.approx([0.3], rel=1e-12)
     assert dG == pytest.approx((1.0 - 0.3**2) * 0.15)
     assert (top[0], critical[0]) == pytest.approx((0.15, 0.2))
 
@@ -191,7 +203,7 @@ def test_any_units(dG: Array, decades: int) -> None:
         (lambda: Paris(1.0, math.inf, 1.0, 1.0), "Paris: c2 = inf must be finite"),
         (lambda: Paris(1.0, -2.0, 0.0, 1.0), "Paris: c3 = 0.0 must be positive"),
         (lambda: Paris(1.0, -2.0, 1.0, 1.0, 0.9, 0.8), "r1 = 0.9 must be below .* r2 = 0.8"),
-        (lambda: Fatigue(0.2, paris=(1, 2, 3, 4)), r"must be a Paris\(c1, c2, c3, c4\)"),
+        (lambda: Fatigue(0.2, paris=(1, 2, 3, 4)), r"must be a Paris\(c1, c2, c3, c4\)"),  # type: ignore[arg-type]
         (lambda: Fatigue(0.2, 0.8, paris=LAW), "Fatigue: GIIc or GIIIc is given but no mode-mix"),
         (lambda: cycle_jump(LAW, [0.5], [math.nan], 1.0, 1.0), "G_max = nan at front node 0"),
         (lambda: cycle_jump(LAW, [0.5], [0.5], 0.0, 1.0), "G_c = 0.0 at front node 0; .* positive"),

@@ -101,7 +101,7 @@ OTHERS = {
     "cps4r_parametric": "*USER MATERIAL is refused",
     "cube_mixed_case": "",
     "dcb3d_coh": "COH3D8 is refused: cohesive elements",
-    "dcb3d_tie": "explicit dynamics is not read from decks yet",
+    "dcb3d_tie": "continuum shells are elements of the second order here",
     "dcbenf_wedges": "C3D15 is refused: prisms",
     "distributing": "*DISTRIBUTING is refused",
     "gaps_in_numbers": "",
@@ -109,7 +109,7 @@ OTHERS = {
     "necking_cax4rt": "CAX4RT is refused: temperatures",
     "plastic_cpe4": "plasticity is for small strain and cannot stand beside NLGEOM=YES",
     "plate_s4r": "S4R is refused: shells",
-    "preform_shear": "*COHESIVE BEHAVIOR is refused",
+    "preform_shear": "*DAMAGE INITIATION is refused",
     "two_instances": "*PLASTIC: the parameter PROPERTIES is not available",
 }
 """What becomes of each: nothing (it runs), or part of a refusal."""

@@ -146,7 +146,28 @@ CALLS: list[Call] = [
     ),
     (fx.EnhancedVCCT, {"GIc": 0.2, "GIc_p": 0.3}),
     (fx.Fatigue, {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False}),
-    (fx.Paris, {"c1": 1.0, "c2": -2.0, "c3": 1.0, "c4": 1.0, "r1": 0.01, "r2": 0.85}),
+    (
+        fx.Paris,
+        {
+            "c1": 1.0, "c2": -2.0, "c3": 1.0, "c4": 1.0, "r1": 0.01, "r2": 0.85, "drive": "dK",
+            "normalised": True,
+        },
+    ),
+    (fx.Fatigue, {"GIc": 0.2, "growth": fx.ParisK(1.0, 2.0, 7e4, 0.3)}),
+    (fx.ParisK, {"C": 1.0, "m": 2.0, "E": 7e4, "nu": 0.3, "state": "plane strain", "dK_th": 1.0}),
+    (
+        fx.Blanco,
+        {
+            "C_I": 1.0, "m_I": 2.0, "C_II": 1.0, "m_II": 3.0, "C_m": 2.0, "m_m": 1.0, "c1": 0.0,
+            "c2": -1.0, "r1": ([0.0, 1.0], [0.1, 0.2]), "drive": fx.Walker(0.5),
+        },
+    ),
+    (
+        fx.KenaneBenzeggagh,
+        {"C_I": 1.0, "m_I": 2.0, "C_II": 1.0, "m_II": 3.0, "p": 2.0, "q": 1.0, "normalised": False},
+    ),
+    (fx.Walker, {"gamma": 0.5}),
+    (fx.Elber, {"a": 0.5, "b": 0.4}),
     (fx.BK, {"eta": 1.6}),
     (fx.Reeder, {"eta": 1.6}),
     (fx.Power, {"am": 1.0, "an": 1.0, "ao": 1.0}),

@@ -103,21 +103,22 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
 
 
 def monitor_weights(continuum: Continuum, monitor: Monitor) -> Array:
-    """Weights of the owned dofs in a monitored displacement, shape (n_local,); collective.
+    """Weights of the owned dofs in a monitored value, shape (n_local,); collective.
 
     Raises:
         InputError: The direction has another number of components, or the group does not fit.
     """
-    if len(monitor.direction) != continuum.gdim:
-        raise InputError(
-            f"Monitor('{monitor.title}'): direction has {len(monitor.direction)} components, "
-            f"{continuum.gdim} are needed"
-        )
-    nodes = continuum.owned_nodes(monitor.where)
-    count = continuum.comm.allreduce(len(nodes))
     out = np.zeros(continuum.n_local)
-    for i, component in enumerate(monitor.direction):
-        out[continuum.layout.dof(nodes, i)] = component / count
+    for term in monitor.terms:
+        if len(term.direction) != continuum.gdim:
+            raise InputError(
+                f"Monitor('{term.title}'): direction has {len(term.direction)} components, "
+                f"{continuum.gdim} are needed"
+            )
+        nodes = continuum.owned_nodes(term.where)
+        count = continuum.comm.allreduce(len(nodes))
+        for i, component in enumerate(term.direction):
+            out[continuum.layout.dof(nodes, i)] += component / count
     return out
 
 

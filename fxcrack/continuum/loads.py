@@ -5,7 +5,7 @@ Every entry is a pattern in space times an amplitude in time; a scene may hold a
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +14,7 @@ import numpy as np
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import (
     as_float,
+    check_list,
     flag,
     is_function,
     keep,
@@ -333,15 +334,21 @@ Load = Traction | Pressure | BodyForce | PointForce | Moment | PointMoment
 class Monitor:
     """Mean displacement of a named group in one direction, written to the history.
 
+    The value is the product of the displacement with ``direction``, plus those of the monitors in
+    ``plus``: directions that are no unit vectors are factors. The load point of a lever of length c
+    on a beam of half span L, for instance, moves by c/L of its end and (c + L)/L of its middle.
+
     Args:
         where: Name of a group.
         direction: Components of the direction; the displacement along it is reported.
         name: Column of the history; group and direction by default.
+        plus: Further monitors that are added, for a linear combination of displacements.
     """
 
     where: str
     direction: tuple[float, ...]
     name: str | None = None
+    plus: Sequence[Monitor] = ()
 
     def __post_init__(self) -> None:
         """Refuse a direction that is none."""
@@ -353,8 +360,14 @@ class Monitor:
                 f"{owner}: direction = {direction} must hold finite numbers, not all of them zero"
             )
         keep(self, direction=direction)
+        keep(self, plus=tuple(check_list(owner, "plus", self.plus, Monitor)))
 
     @property
     def title(self) -> str:
         """Name in the history."""
         return self.name or f"u_{self.where}"
+
+    @property
+    def terms(self) -> list[Monitor]:
+        """This monitor and all that are added to it."""
+        return [self, *(term for monitor in self.plus for term in monitor.terms)]

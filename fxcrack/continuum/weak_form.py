@@ -142,7 +142,8 @@ class WeakForm:
         for term, form, _ in self._forms:
             start = time.perf_counter()
             if form is None:
-                term.add_residual(vector, self.u)
+                with vector.localForm() as local:
+                    term.add_residual(local.array, self.u)
             else:
                 dolfinx.fem.petsc.assemble_vector(vector, form)
             self._add(term.name, start)

@@ -5,7 +5,8 @@ With initial tip 1, current tip 3 and node 2 behind it (on the open side),
     l_3 = l_1 + d_12 + d_23,    f = (l(t) - (l_3 - d_23))/d_23
 
 l_1 is the straight line from the reference point (the mean position of a node set) to the initial
-tip, the other lengths run along the slave surface, and l(t) is the user's curve. f grows from 0,
+tip, or its part along a given direction; the other lengths run along the slave surface, and l(t) is
+the user's curve. f grows from 0,
 crack at node 2, to 1, crack at the tip: the tip debonds.
 """
 
@@ -20,7 +21,7 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
-from fxcrack.base.checks import flag, keep, not_negative, shown, table
+from fxcrack.base.checks import flag, keep, not_negative, numbers, shown, table
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.evaluator import Evaluator
@@ -43,6 +44,8 @@ class CrackLengthVsTime(Criterion):
         moving: Whether the reference point and the initial tips take their displacements along;
             positions are those of the undeformed body otherwise.
         tolerance: f_tol; growth is accepted while 1 - f_tol <= f <= 1 + f_tol.
+        direction: Direction in which l_1 is measured, of any length and 2 or 3 components: a front
+            that is straight across it then stays straight. By default l_1 is the distance itself.
     """
 
     times: Sequence[float]
@@ -50,6 +53,7 @@ class CrackLengthVsTime(Criterion):
     reference: str = field(kw_only=True)
     moving: bool = field(default=False, kw_only=True)
     tolerance: float = field(default=0.1, kw_only=True)
+    direction: Sequence[float] | None = field(default=None, kw_only=True)
 
     degree: ClassVar[float] = 1.0
     depends_on_load: ClassVar[bool] = False
@@ -63,6 +67,13 @@ class CrackLengthVsTime(Criterion):
         keep(self, moving=flag(owner, "moving", self.moving))
         if not isinstance(self.reference, str) or not self.reference:
             raise InputError(f"{owner}: reference = {shown(self.reference)} must name a node set")
+        if self.direction is not None:
+            direction = numbers(owner, "direction", self.direction, words="components")
+            if not any(direction) or len(direction) > 3:
+                raise InputError(
+                    f"{owner}: direction = {direction} must have 2 or 3 components, not all zero"
+                )
+            object.__setattr__(self, "direction", direction)
         times, lengths = table(owner, ("times", "lengths"), self.times, self.lengths)
         drops = np.flatnonzero(np.diff(lengths) < 0.0)
         if drops.size:
@@ -177,7 +188,7 @@ class LengthEvaluator(Evaluator):
         self._begin = np.zeros((surface.n_nodes, 3))
         self._grown = np.zeros(surface.n_nodes)
         self._moves = np.zeros(surface.n_nodes, dtype=bool)
-        first = np.linalg.norm(surface.x - self.reference, axis=1)
+        first = self._initial_length(surface.x - self.reference)
         self._starts = criterion.can_start(first)
         self._followed: list[int] = []
         self._slot = np.zeros(surface.n_nodes, dtype=np.int64)
@@ -200,6 +211,14 @@ class LengthEvaluator(Evaluator):
                 "all" if len(stuck) == len(initial) else str(len(stuck)),
                 len(initial),
             )
+
+    def _initial_length(self, way: Array) -> Array:
+        """Length l_1 of the way from the reference point, shape (n, 3) to (n,), length."""
+        if self.criterion.direction is None:
+            return np.asarray(np.linalg.norm(way, axis=1))
+        along = np.zeros(3)
+        along[: len(self.criterion.direction)] = self.criterion.direction
+        return np.asarray(way @ (along / np.linalg.norm(along)))
 
     def _look_at(self, tips: Tips) -> Origins:
         """Note where the tips come from, when the front has moved."""
@@ -244,7 +263,7 @@ class LengthEvaluator(Evaluator):
             f, shape (n,), and "length", shape (n,) [length].
         """
         way = self._begin[tips.node] - self.reference + measured[:, 2:]
-        length = np.linalg.norm(way, axis=1) + self._grown[tips.node]
+        length = self._initial_length(way) + self._grown[tips.node]
         f = self.criterion.fraction(measured[:, 0], length, tips.d_behind)
         begun = measured[:, 1] > 1.0 - 1e-12  # between two states it is 1 up to round-off, or not
         return np.where(begun & self._moves[tips.node], f, 0.0), {"length": length}

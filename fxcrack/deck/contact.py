@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
     AmplitudeRelease,
@@ -21,24 +21,16 @@ from fxcrack.criteria import (
 )
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.deck.cards import Card, Row, key, label
+from fxcrack.deck.everywhere import Everywhere
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.fracture import NodalRates, read_criterion
+from fxcrack.deck.general_contact import GeneralContact
 from fxcrack.deck.groups import Groups
+from fxcrack.deck.interactions import friction, interaction, note_thickness
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
 from fxcrack.interface.pairing import Interface
 from fxcrack.steps.debond import Debond
-
-
-@dataclass(frozen=True)
-class Everywhere:
-    """Marks all nodes or none."""
-
-    value: bool
-
-    def __call__(self, x: Array) -> Array:
-        """One truth value per position; x of shape (3, n)."""
-        return np.full(np.shape(x)[1], self.value)
 
 
 @dataclass(eq=False)
@@ -75,6 +67,7 @@ class Contacts:
         groups: Takes their surfaces.
         report: Takes what is replaced.
         finite: Whether bodies turn far (NLGEOM).
+        explicit: Whether the steps are explicit.
 
     Attributes:
         pairs: The contact pairs.
@@ -84,14 +77,20 @@ class Contacts:
     """
 
     def __init__(
-        self, cards: Sequence[Card], flat: Flat, groups: Groups, report: Report, finite: bool
+        self,
+        cards: Sequence[Card],
+        flat: Flat,
+        groups: Groups,
+        report: Report,
+        *,
+        finite: bool,
+        explicit: bool,
     ) -> None:
         self._flat, self._groups, self._report, self._finite = flat, groups, report, finite
+        self._explicit = explicit
         self.pairs: list[PairDef] = []
         self._clearances = [card for card in cards if card.keyword == "CLEARANCE"]
         for card in cards:
-            if card.keyword in ("CONTACTCLEARANCE", "CONTACTCLEARANCEASSIGNMENT"):
-                self._refuse_clearance(card)
             if card.keyword == "CONTACTPAIR":
                 for row in card.need_rows("slave surface, master surface"):
                     self._add_pair(row)
@@ -102,14 +101,7 @@ class Contacts:
         self._ties = [card for card in cards if card.keyword == "TIE"]
         nodal = [card for card in cards if card.keyword == "NODALENERGYRATE"]
         self._nodal = NodalRates(nodal, flat) if nodal else None
-
-    def _refuse_clearance(self, card: Card) -> None:
-        if card.has("SEARCH NSET") and card.has("SEARCH ABOVE", "SEARCH BELOW"):
-            card.fail("SEARCH NSET excludes SEARCH ABOVE and SEARCH BELOW; give one of them")
-        card.fail(
-            "it belongs to explicit dynamics with general contact, which decks do not give yet; in "
-            "quasi-static decks bond the pair by *INITIAL CONDITIONS, TYPE=CONTACT"
-        )
+        self._general = GeneralContact(cards, flat, groups, report, explicit=explicit)
 
     # -- pairs ---------------------------------------------------------------------------
 
@@ -181,6 +173,12 @@ class Contacts:
                 card.fail("it must stand directly after *DEBOND")
             if card.keyword != "DEBOND":
                 continue
+            if self._explicit:
+                card.fail(
+                    "it belongs to quasi-static steps; in explicit dynamics the bond and its "
+                    "criterion are *COHESIVE BEHAVIOR and *FRACTURE CRITERION of a surface "
+                    "interaction"
+                )
             if i + 1 == len(cards) or cards[i + 1].keyword != "FRACTURECRITERION":
                 card.fail("*FRACTURE CRITERION must stand directly after it")
             slave, master = card.text("SLAVE", "SECONDARY"), card.text("MASTER", "MAIN")
@@ -235,7 +233,8 @@ class Contacts:
             self._check_wake(pair)
         for card in self._ties:
             bonds += [self._tie(row) for row in card.need_rows("slave surface, master surface")]
-        return debonds, bonds
+        more, others = self._general.build(interactions, self._nodal, finite=self._finite)
+        return debonds + more, bonds + others
 
     def _check_wake(self, pair: PairDef) -> None:
         """Look at the tips on a line: at corner nodes, with two open elements behind them.
@@ -330,40 +329,9 @@ class Contacts:
         card = pair.row.card
         if not card.has("INTERACTION"):
             return None
-        name = card.text("INTERACTION")
-        if key(name) not in interactions:
-            card.fail(f"there is no surface interaction '{name}'; define it")
-        family = interactions[key(name)]
-        behavior = family.first("SURFACEBEHAVIOR")
-        if behavior is not None and behavior.word("PRESSURE-OVERCLOSURE", "HARD") != "HARD":
-            behavior.fail(
-                f"PRESSURE-OVERCLOSURE={behavior.text('PRESSURE-OVERCLOSURE')} is not available; "
-                "contact is exact here, PRESSURE-OVERCLOSURE=HARD"
-            )
-        if self._flat.kind.gdim == 2:
-            self._note_thickness(family)
-        card = family.first("FRICTION")  # type: ignore[assignment]
-        if card is None:
-            return None
-        if card.has("ROUGH"):
-            card.fail("ROUGH is not available; give a large coefficient of friction")
-        rows = card.rows()
-        if len(rows) > 1 or any(row.text(i) for row in rows for i in range(1, len(row))):
-            card.fail("only one coefficient is available; no tables, no shear limit")
-        return (rows[0].number(0, 0.0) if rows else 0.0) or None
-
-    def _note_thickness(self, family: Family) -> None:
-        rows = family.card.rows()
-        given = rows[0].number(0, 1.0) if rows else 1.0
-        for placed in self._flat.placed.values():
-            for section in placed.space.sections:
-                data = section.rows()
-                if data and data[0].number(0, 1.0) != given:
-                    self._report.replace(
-                        f"the interface has the thickness of the bodies, "
-                        f"{data[0].number(0, 1.0):g}, not {given:g}",
-                        family.card,
-                    )
+        family = interaction(card, card.text("INTERACTION"), interactions)
+        note_thickness(family, self._flat, self._report)
+        return friction(family)
 
     def _debond(self, pair: PairDef) -> Debond:
         assert pair.interface is not None

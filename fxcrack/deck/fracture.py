@@ -285,8 +285,8 @@ def _rates(card: Card, kind: str, nodal: dict[str, NodalField] | None) -> Criter
             row.number(1),
             row.number(2),
             row.number(3),
-            row.number(4, Paris.r1),
-            row.number(5, Paris.r2),
+            row.number(4, 0.01),
+            row.number(5, 0.85),
         )
         return Fatigue(**toughness, **options, paris=paris)
     if card.has("UNSTABLE GROWTH TOLERANCE"):

@@ -70,9 +70,15 @@ _READ = {
     "SURFACE INTERACTION": ("NAME", ""),
     "FRICTION": ("ROUGH", "LAGRANGE, SLIP TOLERANCE, ELASTIC SLIP"),
     "SURFACE BEHAVIOR": ("PRESSURE-OVERCLOSURE", "AUGMENTED LAGRANGE, PENALTY, DIRECT"),
+    "COHESIVE BEHAVIOR": ("TYPE, DEPENDENCIES, ELIGIBILITY, REPEATED CONTACTS", ""),
+    "CONTACT": ("", "OP"),
+    "CONTACT INCLUSIONS": ("ALL EXTERIOR, ALL ELEMENT BASED", ""),
+    "CONTACT PROPERTY ASSIGNMENT": ("", ""),
+    "CONTACT FORMULATION": ("TYPE", ""),
     "CONTACT PAIR": (
         "INTERACTION, TYPE, ADJUST, TIED, SMALL SLIDING",
-        "EXTENSION ZONE, SMOOTH, HCRIT, SLIDE DISTANCE, MINIMUM DISTANCE, CPSET",
+        "EXTENSION ZONE, SMOOTH, HCRIT, SLIDE DISTANCE, MINIMUM DISTANCE, CPSET, WEIGHT, OP, "
+        "MECHANICAL CONSTRAINT",
     ),
     "CLEARANCE": ("SLAVE, MASTER, SECONDARY, MAIN, VALUE, CPSET", ""),
     "CONTACT CLEARANCE": (
@@ -97,11 +103,15 @@ _READ = {
     "STATIC": ("DIRECT, STABILIZE, ALLSDTOL, FACTOR, RIKS", "CONTINUE"),
     "VISCO": ("DIRECT, CETOL, STABILIZE, ALLSDTOL, FACTOR", "CREEP"),
     "DYNAMIC": (
-        "ALPHA, APPLICATION, DIRECT, EXPLICIT, HAFTOL, HALFINC SCALE FACTOR",
-        "INITIAL, NOHAF, IMPACT",
+        "ALPHA, APPLICATION, DIRECT, EXPLICIT, HAFTOL, HALFINC SCALE FACTOR, SCALE FACTOR, "
+        "DIRECT USER CONTROL, ADIABATIC",
+        "INITIAL, NOHAF, IMPACT, ELEMENT BY ELEMENT, FIXED TIME INCREMENTATION, IMPROVED DT METHOD",
     ),
     "DIRECT CYCLIC": ("FATIGUE", "CETOL, CONTINUE, DELTMX, TIME POINTS, CRITERION"),
     "FATIGUE": ("TYPE", "CETOL, DELTMX, DIRECT, TIME POINTS"),
+    "BULK VISCOSITY": ("", ""),
+    "FIXED MASS SCALING": ("FACTOR, DT, TYPE, ELSET", ""),
+    "VARIABLE MASS SCALING": ("FACTOR, DT, TYPE, ELSET", "FREQUENCY, NUMBER INTERVAL"),
     "BOUNDARY": ("AMPLITUDE, OP, TYPE, FIXED", "LOAD CASE, REGION TYPE"),
     "CLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
     "DLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
@@ -144,8 +154,8 @@ _COHESIVE = (
     "*FRACTURE CRITERION"
 )
 _GENERAL = (
-    "general contact is not available; name the surfaces that meet by *CONTACT PAIR and bonded "
-    "ones by *INITIAL CONDITIONS, TYPE=CONTACT"
+    "this part of general contact is not available; name the pairs of surfaces that meet by "
+    "*CONTACT INCLUSIONS (explicit dynamics) or *CONTACT PAIR"
 )
 _THERMAL = "heat is not computed; prescribe temperatures by *TEMPERATURE"
 _PERTURBATION = "only *STATIC, *VISCO, *DYNAMIC, *DIRECT CYCLIC with FATIGUE and *FATIGUE are"
@@ -160,7 +170,6 @@ _REFUSED = {
     "BEAM SECTION": "beams are not available; use solid elements",
     "BEAM GENERAL SECTION": "beams are not available; use solid elements",
     "COHESIVE SECTION": _COHESIVE,
-    "COHESIVE BEHAVIOR": _COHESIVE,
     "DAMAGE INITIATION": _COHESIVE,
     "DAMAGE EVOLUTION": _COHESIVE,
     "DAMAGE STABILIZATION": _COHESIVE,
@@ -171,10 +180,7 @@ _REFUSED = {
     "USER DEFINED FIELD": _USER,
     "USER ELEMENT": "user elements cannot be run; use solid elements",
     "UEL PROPERTY": "user elements cannot be run; use solid elements",
-    "CONTACT": _GENERAL,
-    "CONTACT INCLUSIONS": _GENERAL,
     "CONTACT EXCLUSIONS": _GENERAL,
-    "CONTACT PROPERTY ASSIGNMENT": _GENERAL,
     "SURFACE PROPERTY ASSIGNMENT": _GENERAL,
     "CONTACT INITIALIZATION ASSIGNMENT": _GENERAL,
     "CONTACT INTERFERENCE": "start from surfaces that meet; interference is not available",
@@ -208,9 +214,6 @@ _REFUSED = {
     "CYCLIC HARDENING": "only isotropic hardening is available",
     "DEFORMATION PLASTICITY": "use *PLASTIC with a table",
     "HYPERFOAM": "neo-Hookean bodies are available: *HYPERELASTIC, NEO HOOKE",
-    "BULK VISCOSITY": "it belongs to explicit dynamics, which is not read from decks yet",
-    "FIXED MASS SCALING": "it belongs to explicit dynamics, which is not read from decks yet",
-    "VARIABLE MASS SCALING": "it belongs to explicit dynamics, which is not read from decks yet",
     "INELASTIC HEAT FRACTION": _THERMAL,
     "HEAT TRANSFER": _THERMAL,
     "COUPLED TEMPERATURE-DISPLACEMENT": _THERMAL,

@@ -200,6 +200,12 @@ class Loads:
             entry.track.hold(period)
         return entry
 
+    @property
+    def following(self) -> LoadEntry | None:
+        """A pressure that follows the bodies, None without."""
+        entries = self._entries.values()
+        return next((e for e in entries if e.follows and not e.track.zero), None)
+
     def loads(self, groups: Groups, densities: dict[str, float | None]) -> list[Load]:
         """The loads of the scene.
 

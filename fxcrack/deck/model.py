@@ -26,7 +26,7 @@ from fxcrack.deck.report import Report
 from fxcrack.deck.spaces import HOME, Elements, Numbered, Space, SurfaceDef
 
 _OF_MATERIALS = ("ELASTIC", "PLASTIC", "EXPANSION", "DENSITY", "HYPERELASTIC", "DAMPING")
-_OF_INTERACTIONS = ("FRICTION", "SURFACEBEHAVIOR")
+_OF_INTERACTIONS = ("FRICTION", "SURFACEBEHAVIOR", "COHESIVEBEHAVIOR", "FRACTURECRITERION")
 _GENERATORS = {
     "NGEN": generate_nodes,
     "NFILL": fill_nodes,

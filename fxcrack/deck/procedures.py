@@ -1,7 +1,8 @@
 """Steps of a deck as steps of the scene.
 
 ``*STATIC``, ``*VISCO``, ``*DYNAMIC``, ``*DIRECT CYCLIC``, ``*FATIGUE`` and ``*CONTROLS``.
-A new procedure is one function in :data:`PROCEDURES`.
+A new procedure is one function in :data:`PROCEDURES`; explicit dynamics has a module of its own,
+:mod:`fxcrack.deck.explicit`.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from typing import Any
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.deck.cards import Card
+from fxcrack.deck.explicit import explicit_step, explicit_words
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
 from fxcrack.deck.tracks import Period
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.end_conditions import Time
+from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.static import Dynamic, Static
 
 _SMALLEST = 1e-5
@@ -35,7 +38,7 @@ class DeckStep:
     """
 
     name: str
-    step: Static | Cycles
+    step: Static | Cycles | Explicit
     grow: tuple[str, ...] = ()
 
 
@@ -44,14 +47,16 @@ class Procedure:
     """What the cards of a step say beside its loads.
 
     Attributes:
+        card: The card of the procedure.
         period: Its beginning and end in total time.
         step: The step of the scene.
         finite: Whether NLGEOM is on.
         inertia: The effect it needs of the scene, None for a quasi-static step.
     """
 
+    card: Card
     period: Period
-    step: Static | Cycles
+    step: Static | Cycles | Explicit
     finite: bool
     inertia: Inertia | None = None
 
@@ -74,6 +79,7 @@ class _Asked:
     controls: _Controls
     ramp: bool | None
     report: Report
+    step: Family
 
     def period(self, length: float, *, ramp: bool, moving: bool = False) -> Period:
         chosen = ramp if self.ramp is None else self.ramp
@@ -106,7 +112,17 @@ def read_procedures(steps: Sequence[Family], report: Report) -> list[Procedure]:
             controls,
             _ramp(family.card),
             report,
+            family,
         )
+        explicit = found[0].keyword == "DYNAMIC" and found[0].has("EXPLICIT")
+        if not explicit:
+            for card in explicit_words(family):
+                card.fail("it belongs to explicit dynamics, *DYNAMIC, EXPLICIT; leave it out")
+        elif not family.card.has("NLGEOM") and not finite:
+            report.replace(
+                "NLGEOM is on, as in every explicit step that does not say NLGEOM=NO", family.card
+            )
+            finite = True
         try:
             period, step, inertia = PROCEDURES[found[0].keyword](asked)
         except InputError as error:
@@ -117,13 +133,17 @@ def read_procedures(steps: Sequence[Family], report: Report) -> list[Procedure]:
             found[0].fail("after a step of cycles only further steps of cycles are available")
         if isinstance(step, Cycles) and finite:
             family.card.fail("cycles need NLGEOM=NO: their bodies are linear")
+        if out and isinstance(step, Explicit) != isinstance(out[0].step, Explicit):
+            found[0].fail(
+                "explicit steps and others in one deck are not available; compute them as two decks"
+            )
         if out and (inertia is None) != (out[0].inertia is None):
             found[0].fail(
                 "dynamic and quasi-static steps in one deck are not available; compute them as two"
             )
         if out and inertia is not None and inertia != out[0].inertia:
             found[0].fail("the time integration must be the same in all dynamic steps")
-        out.append(Procedure(period, step, finite, inertia))
+        out.append(Procedure(found[0], period, step, finite, inertia))
         time = period.end
     return out
 
@@ -166,7 +186,7 @@ def _read_controls(card: Card, controls: _Controls, report: Report) -> None:
 
 # -- procedures ------------------------------------------------------------------------------------
 
-Found = tuple[Period, Static | Cycles, Inertia | None]
+Found = tuple[Period, Static | Cycles | Explicit, Inertia | None]
 
 
 def _increments(asked: _Asked) -> tuple[float, dict[str, Any]]:
@@ -249,10 +269,9 @@ def _dynamic(asked: _Asked) -> Found:
 
 def _explicit(asked: _Asked) -> Found:
     """``*DYNAMIC, EXPLICIT``: second field of the data line is the length of the step."""
-    asked.card.fail(
-        "explicit dynamics is not read from decks yet: run it in Python (fx.Explicit), or "
-        "take implicit *DYNAMIC"
-    )
+    length, step = explicit_step(asked.card, asked.step, asked.start, asked.report)
+    # the effect brings densities, velocity at the start and damping; its alphas are not used
+    return asked.period(length, ramp=False, moving=True), step, Inertia()
 
 
 def _cyclic(asked: _Asked) -> Found:

@@ -55,6 +55,11 @@ class Temperatures:
         self._given = False
         self._first: Card | None = None
 
+    @property
+    def first(self) -> Card | None:
+        """The first card that gives a temperature, None without."""
+        return self._first
+
     def start(self, cards: Sequence[Card]) -> None:
         """Read ``*INITIAL CONDITIONS, TYPE=TEMPERATURE``."""
         for card in cards:
@@ -135,17 +140,27 @@ class Temperatures:
         if np.ptp(values) == 0.0:
             return float(values[0])
         x = flat.points[used][:, : flat.kind.gdim]
-        _check_unique(x, values, self._first)
+        check_unique(x, values, self._first, "temperatures")
         return NodalField(x, values)
 
 
-def _check_unique(x: Array, values: Array, card: Card | None) -> None:
-    """Refuse different values at nodes of one position (the two faces of a crack)."""
+def check_unique(x: Array, values: Array, card: Card | None, what: str) -> None:
+    """Refuse different values at nodes of one position (the two faces of a crack).
+
+    Args:
+        x: Positions, shape (n, gdim), length.
+        values: Shape (n,).
+        card: The card that gives them.
+        what: What they are, in words.
+
+    Raises:
+        DeckError: They differ.
+    """
     size = float(np.ptp(x, axis=0).max())
     pairs = cKDTree(x).query_pairs(1e-9 * size, output_type="ndarray")
     if len(pairs) and np.any(values[pairs[:, 0]] != values[pairs[:, 1]]):
         assert card is not None
         card.fail(
-            "two nodes at one place (the two faces of an interface) have different temperatures, "
-            "which is not available; give them the same"
+            f"two nodes at one place (the two faces of an interface) have different {what}, which "
+            "is not available; give them the same"
         )

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import Monitor
 from fxcrack.continuum.materials import Plastic
 from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
 from fxcrack.deck.constraints import read_links
 from fxcrack.deck.contact import Contacts
+from fxcrack.deck.explicit_rules import check_density, check_explicit
 from fxcrack.deck.flat import Flat
+from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.loads import Loads
 from fxcrack.deck.model import Family, Model
@@ -24,21 +25,23 @@ from fxcrack.deck.report import Report
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
 from fxcrack.deck.tracks import Amplitudes
+from fxcrack.deck.velocity import StartingVelocity, starting_velocity
 from fxcrack.effects import FiniteStrain
 from fxcrack.mesh.raw import RawMesh
 from fxcrack.steps.cycles import Cycles
+from fxcrack.steps.explicit import Explicit
 
 _IN_STEPS = frozenset(
     (
         *("STATIC", "VISCO", "DYNAMIC", "DIRECTCYCLIC", "FATIGUE", "CONTROLS", "BOUNDARY"),
         *("CLOAD", "DLOAD", "DSLOAD", "TEMPERATURE", "DEBOND", "FRACTURECRITERION"),
+        *("BULKVISCOSITY", "FIXEDMASSSCALING", "VARIABLEMASSSCALING", *GENERAL),
     )
 )
 _IN_MODEL = frozenset(
     (
         *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
-        *("EQUATION", "RIGIDBODY", "CLEARANCE", "CONTACTCLEARANCE", "NODALENERGYRATE"),
-        *("CONTACTCLEARANCEASSIGNMENT", "CONTROLS"),
+        *("EQUATION", "RIGIDBODY", "CLEARANCE", "NODALENERGYRATE", "CONTROLS", *GENERAL),
     )
 )
 
@@ -78,7 +81,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     groups = Groups(flat)
     cards = _model_cards(flat)
     procedures = read_procedures(model.steps, report)
-    _check_steps(model.steps)
+    explicit = bool(procedures) and isinstance(procedures[0].step, Explicit)
+    _check_steps(model.steps, explicit=explicit)
     finite = _finite(model.steps, procedures, report)
     periods = [p.period for p in procedures]
     amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
@@ -87,7 +91,10 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     loads = Loads(flat, amplitudes, report, finite)
     temperatures = Temperatures(flat, report)
     temperatures.start(_initial(cards, "TEMPERATURE"))
-    contacts = Contacts(cards, flat, groups, report, finite)
+    contacts = Contacts(
+        cards + _contact_of_steps(model.steps, explicit=explicit), flat, groups, report,
+        finite=finite, explicit=explicit,
+    )  # fmt: skip
     steps = []
     for number, (family, procedure) in enumerate(zip(model.steps, procedures, strict=True)):
         of_step = family.cards
@@ -100,6 +107,11 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         steps.append(DeckStep(family.name, procedure.step, tuple(grow)))
     sections = read_sections(flat, groups, report)
     _check_finite(finite, sections, model)
+    moving = [p for p in procedures if p.inertia is not None]
+    if moving:
+        check_density(moving[0], sections, model)
+    if explicit:
+        check_explicit(moving[0], flat, sections, loads, temperatures, boundary)
     supports = boundary.displacements(groups)
     supports += boundary.link_displacements(read_links(cards, flat), groups)
     held = np.unique(
@@ -108,6 +120,9 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         )
     )
     debonds, bonds = contacts.build(model.interactions, held)
+    if explicit:
+        grow = [d.interface.title for d in debonds]
+        steps = [DeckStep(s.name, s.step, tuple(grow)) for s in steps]
     densities = {n: getattr(m, "density", None) for n, m in sections.materials.items()}
     arguments: dict[str, Any] = {
         "materials": sections.materials,
@@ -117,7 +132,13 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         "debonds": debonds,
         "bonds": bonds,
         "monitors": _monitors(model.steps, flat, groups),
-        "effects": _effects(procedures, sections, temperatures, finite),
+        "effects": _effects(
+            procedures,
+            sections,
+            temperatures,
+            starting_velocity(_initial(cards, "VELOCITY"), flat),
+            finite=finite,
+        ),
     }
     raw = groups.raw_mesh()
     _tell(report, flat, arguments, steps)
@@ -136,11 +157,22 @@ def _model_cards(flat: Flat) -> list[Card]:
     return flat.model.cards
 
 
-def _check_steps(steps: Sequence[Family]) -> None:
+def _check_steps(steps: Sequence[Family], *, explicit: bool) -> None:
     for family in steps:
         for card in family.cards:
-            if card.keyword in _IN_MODEL and card.keyword not in _IN_STEPS:
+            pair = explicit and card.keyword == "CONTACTPAIR"
+            if card.keyword in _IN_MODEL and card.keyword not in _IN_STEPS and not pair:
                 card.fail("it is model data; move it before the first *STEP")
+
+
+def _contact_of_steps(steps: Sequence[Family], *, explicit: bool) -> list[Card]:
+    """Contact that the first step defines; explicit decks may give it there."""
+    kinds = (*GENERAL, "CONTACTPAIR") if explicit else GENERAL
+    for family in steps[1:]:
+        for card in family.cards:
+            if card.keyword in kinds:
+                card.fail("contact stays what it is in all steps; define it once, in the first")
+    return [c for family in steps[:1] for c in family.cards if c.keyword in kinds]
 
 
 def _initial(cards: Sequence[Card], kind: str) -> list[Card]:
@@ -148,7 +180,7 @@ def _initial(cards: Sequence[Card], kind: str) -> list[Card]:
     found = []
     for card in cards:
         if card.keyword == "INITIALCONDITIONS":
-            given = card.choose("TYPE", ("CONTACT", "TEMPERATURE"), card.text("TYPE"))
+            given = card.choose("TYPE", ("CONTACT", "TEMPERATURE", "VELOCITY"), card.text("TYPE"))
             if given == kind:
                 found.append(card)
     return found
@@ -181,6 +213,8 @@ def _effects(
     procedures: Sequence[Procedure],
     sections: Sections,
     temperatures: Temperatures,
+    velocity: StartingVelocity | None,
+    *,
     finite: bool,
 ) -> list[Any]:
     effects: list[Any] = []
@@ -188,10 +222,13 @@ def _effects(
         effects.append(FiniteStrain())
     effects += temperatures.effect(sections.zero)
     inertia = next((p.inertia for p in procedures if p.inertia is not None), None)
-    if inertia is not None:
-        effects.append(
-            Inertia(alpha_m=inertia.alpha_m, alpha_f=inertia.alpha_f, rayleigh=sections.rayleigh)
+    if velocity is not None and inertia is None:
+        velocity.card.fail(
+            "bodies have a velocity in dynamic steps only; add *DYNAMIC, or leave it out"
         )
+    if inertia is not None:
+        start = None if velocity is None else velocity.components
+        effects.append(replace(inertia, rayleigh=sections.rayleigh, velocity=start))
     return effects
 
 
@@ -240,7 +277,8 @@ def _tell(report: Report, flat: Flat, arguments: dict[str, Any], steps: Sequence
         interface = debond.interface
         report.read.append(
             f"debond: slave '{interface.slave}', master '{interface.master}', bonded "
-            f"'{interface.bonded}': {debond.criterion}, {debond.release}"
+            f"'{interface.bonded}': {debond.criterion}"
+            + (f", {debond.release}" if debond.release_chosen else "")
         )
     for interface in arguments["bonds"]:
         report.read.append(f"interface: slave '{interface.slave}', master '{interface.master}'")

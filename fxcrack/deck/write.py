@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -48,7 +47,9 @@ from fxcrack.deck.elements import FACES, added_nodes, element_type, face_nodes, 
 from fxcrack.deck.gather import Gathered, gather
 from fxcrack.deck.lines import broken, number, set_lines
 from fxcrack.deck.procedures import DeckStep
+from fxcrack.deck.write_explicit import explicit_interface
 from fxcrack.deck.write_properties import criterion_lines, material_lines
+from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
 from fxcrack.interface.pairing import Interface, Pair
 from fxcrack.interface.supports import AnySupport
@@ -56,8 +57,8 @@ from fxcrack.mesh.raw import reference
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
-from fxcrack.steps.end_conditions import Time
-from fxcrack.steps.static import Dynamic, Static
+from fxcrack.steps.explicit import Explicit
+from fxcrack.steps.static import Static
 
 _NODES = {
     "triangle": (3, 6),
@@ -67,7 +68,9 @@ _NODES = {
 }
 
 
-def write_deck(scene: Scene, steps: Sequence[Static | Cycles | DeckStep], path: str | Path) -> None:
+def write_deck(
+    scene: Scene, steps: Sequence[Static | Cycles | Explicit | DeckStep], path: str | Path
+) -> None:
     """Write a scene and its steps as a keyword deck; collective, rank 0 writes.
 
     Second-order quadrilaterals and hexahedra are written as 8- and 20-node elements, whose centre
@@ -75,8 +78,8 @@ def write_deck(scene: Scene, steps: Sequence[Static | Cycles | DeckStep], path: 
 
     Args:
         scene: The scene, before or after its steps; its input is written, not its state.
-        steps: Static steps by increments that end at a :class:`~fxcrack.Time`, cycles over a
-            period, or steps of a deck.
+        steps: Static and dynamic steps by increments and explicit ones that end at a
+            :class:`~fxcrack.Time`, cycles over a period, or steps of a deck.
         path: The file.
 
     Raises:
@@ -84,7 +87,7 @@ def write_deck(scene: Scene, steps: Sequence[Static | Cycles | DeckStep], path: 
         FxcrackError: The file could not be written.
     """
     check_instance("write_deck", "scene", scene, Scene, "deck.scene")
-    steps = check_list("write_deck", "steps", steps, (Static, Cycles, DeckStep))
+    steps = check_list("write_deck", "steps", steps, (Static, Cycles, Explicit, DeckStep))
     mesh = gather(scene.mesh)
     toughness = [_nodal_toughness(d, p) for d, p in zip(scene.debonds, scene.pairs, strict=False)]
     comm, lines, problem = scene.mesh.comm, [], None
@@ -120,20 +123,29 @@ class _Writer:
     amplitudes: dict[AmplitudeLike, str] = field(default_factory=dict)
     sets: list[str] = field(default_factory=list)
     end: float = 0.0
+    inertia: Inertia | None = None
+    explicit: bool = False
+    contact: list[str] = field(default_factory=list)
 
-    def lines(self, steps: Sequence[Static | Cycles | DeckStep]) -> list[str]:
+    def lines(self, steps: Sequence[Static | Cycles | Explicit | DeckStep]) -> list[str]:
         """The whole deck."""
         given = self.scene.input
         if given.order is not None and given.order != self.scene.mesh.order:
-            _refuse(
+            refuse(
                 f"a displacement of order {given.order} on elements of order "
                 f"{self.scene.mesh.order}; make the mesh of that order"
             )
         chosen = [s if isinstance(s, DeckStep) else _as_deck_step(self.scene, s, i)
                   for i, s in enumerate(steps)]  # fmt: skip
-        ends = _ends(chosen)
+        ends = ends_of(chosen)
         self.end = ends[-1] if ends else 1.0
-        model = [*self._mesh(), *self._properties(), *self._interfaces()]
+        self.explicit = any(isinstance(s.step, Explicit) for s in chosen)
+        for effect in given.effects:
+            if isinstance(effect, Temperature):
+                refuse(f"the effect {type(effect).__name__}")
+            if isinstance(effect, Inertia):
+                self.inertia = effect
+        model = [*self._mesh(), *self._properties(), *self._interfaces(), *self._velocity()]
         conditions = [*self._supports(), *self._loads()]
         tail: list[str] = []
         start = 0.0
@@ -190,7 +202,7 @@ class _Writer:
         for i, (local, weight) in enumerate(zip(parents, weights, strict=True)):
             at = np.einsum("k,nkc->nc", weight, mesh.points[cells[:, local]])
             if np.abs(at - mesh.points[cells[:, n + i]]).max() > 1e-9 * size:
-                _refuse(
+                refuse(
                     "curved elements whose centre nodes are not where an element without them "
                     "would put them; use straight elements, or triangles and tetrahedra"
                 )
@@ -240,7 +252,7 @@ class _Writer:
             items = list(materials.items())
         for i, (name, material) in enumerate(items):
             title = f"MATERIAL {i + 1}"
-            lines, orientation = material_lines(title, material)  # type: ignore[arg-type]
+            lines, orientation = material_lines(title, material, self.inertia)  # type: ignore[arg-type]
             section = f'*SOLID SECTION, ELSET="{name}", MATERIAL="{title}"'
             out += lines
             if orientation:
@@ -248,6 +260,23 @@ class _Writer:
                 section += f', ORIENTATION="{title}"'
             out += [section, number(thickness) if thickness else ","]
         return out
+
+    def _velocity(self) -> list[str]:
+        """Velocity of the nodes at the beginning."""
+        if self.inertia is None or self.inertia.velocity is None or self.mesh is None:
+            return []
+        nodes = np.flatnonzero(~self._dropped)
+        x = np.zeros((len(nodes), 3))
+        x[:, : self.mesh.points.shape[1]] = self.mesh.points[nodes]
+        out = ["*INITIAL CONDITIONS, TYPE=VELOCITY"]
+        for i, component in enumerate(self.inertia.velocity):
+            values = np.full(len(nodes), component) if not callable(component) else component(x.T)
+            out += [
+                f"{node + 1}, {i + 1}, {number(v)}"
+                for node, v in zip(nodes, values, strict=True)
+                if v
+            ]
+        return out if len(out) > 1 else []
 
     # -- interfaces ----------------------------------------------------------------------
 
@@ -272,7 +301,7 @@ class _Writer:
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
         if callable(interface.friction):
-            _refuse(f"interface '{title}': friction as a function of position")
+            refuse(f"interface '{title}': friction as a function of position")
         slave, master = title, f"{title} master"
         out: list[str] = []
         if self.mesh is not None:
@@ -287,6 +316,8 @@ class _Writer:
             log.warn(
                 "write_deck: interface '%s' has no contact, but open faces of a deck touch", title
             )
+        if self.explicit:
+            return out + self._general(pair, interface)
         adjust = ", ADJUST=0." if interface.gap == "adjust" else ""
         out += [
             f'*SURFACE INTERACTION, NAME="{title}"',
@@ -306,6 +337,25 @@ class _Writer:
                 f'"{slave}", "{master}", "{name}"',
             ]
         return out
+
+    def _general(self, pair: Pair, interface: Interface) -> list[str]:
+        """Model data of an interface in explicit dynamics; its history data are kept."""
+        at = next((i for i, d in enumerate(self.scene.debonds) if d.interface is interface), None)
+        debond = None if at is None else self.scene.debonds[at]
+        found = explicit_interface(
+            interface,
+            None if debond is None else debond.criterion,
+            debond.release if debond is not None and debond.release_chosen else None,
+            bonded=bool(pair.bonded.any()),
+            nodal=at is not None and self.toughness[at] is not None,
+            thickness=self._thickness(),
+        )
+        self.contact += found.in_step
+        out: list[str] = []
+        if pair.bonded.any() and self.mesh is not None:
+            bonded = np.sort(self._slave_numbers(pair, pair.bonded))
+            out = set_lines("NSET", f"{interface.title} bonded", bonded[~self._dropped[bonded]])
+        return out + found.in_model
 
     def _thickness(self) -> float:
         return float(getattr(self.scene.input.model, "thickness", 0.0))
@@ -355,13 +405,13 @@ class _Writer:
 
     def _support(self, support: AnySupport) -> list[str]:
         if not isinstance(support, Displacement):
-            _refuse(f"the support {type(support).__name__}('{support.title}')")
+            refuse(f"the support {type(support).__name__}('{support.title}')")
         held, moved = [], []
         for i, value in enumerate((support.x, support.y, support.z)):
             if value is None:
                 continue
             if callable(value):
-                _refuse(f"support '{support.title}' as a function of position")
+                refuse(f"support '{support.title}' as a function of position")
             line = f'"{support.title}", {i + 1}, {i + 1}'
             if value == 0.0:
                 held.append(line)
@@ -381,12 +431,12 @@ class _Writer:
 
     def _load(self, load: Load) -> list[str]:
         if isinstance(load, Moment | PointMoment):
-            _refuse(f"the load {type(load).__name__}('{load.title}')")
+            refuse(f"the load {type(load).__name__}('{load.title}')")
         name = self._amplitude(load.amplitude)
         title = load.title
         values = load.value if isinstance(load.value, tuple | list) else [load.value]
         if any(callable(v) for v in values):
-            _refuse(f"load '{title}' as a function of position")
+            refuse(f"load '{title}' as a function of position")
         numbers = [float(v) for v in values]  # type: ignore[arg-type]
         if isinstance(load, PointForce):
             n = max(len(self._nodes_of(load.where)), 1)
@@ -406,7 +456,7 @@ class _Writer:
         if isinstance(load, Pressure):
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
-                _refuse(
+                refuse(
                     f"pressure '{title}' with follows={load.follows} and "
                     f"{'' if finite else 'no '}FiniteStrain: in a deck pressures follow if, and "
                     "only if, rotations are large"
@@ -423,31 +473,16 @@ class _Writer:
     # -- steps ---------------------------------------------------------------------------
 
     def _step(self, step: DeckStep, length: float, conditions: list[str]) -> list[str]:
-        what = step.step
         finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
-        for effect in self.scene.input.effects:
-            if isinstance(effect, Temperature | Inertia):
-                _refuse(f"the effect {type(effect).__name__}")
-        nlgeom = "YES" if finite else "NO"
-        count = what.max_increments if isinstance(what, Static) else 100
-        out = [f'*STEP, NAME="{step.name}", NLGEOM={nlgeom}, INC={count}']
-        if isinstance(what, Cycles):
-            n_max = number(what.n_max) if np.isfinite(what.n_max) else "1e12"
-            out += ["*DIRECT CYCLIC, FATIGUE", f"{number(0.1 * length)}, {number(length)}",
-                    f", , {n_max}"]  # fmt: skip
-        else:
-            sizes = (what.initial, length, what.minimum, min(what.maximum, length))
-            out += ["*STATIC", ", ".join(number(x) for x in sizes)]
-            if what.linear_scaling is not None:
-                out += ["*CONTROLS, TYPE=VCCT LINEAR SCALING", number(what.linear_scaling)]
-            out += [
-                "*CONTROLS, PARAMETERS=TIME INCREMENTATION",
-                f", , , , , , , {what.max_cutbacks}",
-                f", {number(what.cutback)}, , , , , {number(what.growth)}",
-            ]
-        out += conditions
+        explicit = isinstance(step.step, Explicit)
+        out = [*step_lines(step, length, self.inertia, finite=finite), *conditions]
+        if conditions and explicit:
+            out += self.contact
         for i, debond in enumerate(self.scene.debonds):
-            if debond.interface.title in step.grow:
+            grows = debond.interface.title in step.grow
+            if explicit and not grows:
+                refuse(f"step '{step.name}', in which '{debond.interface.title}' may not grow")
+            if grows and not explicit:
                 out += self._debond(debond, self.toughness[i] is not None)
         monitors = [line for m in self.scene.input.monitors for line in self._monitor(m)]
         if monitors:
@@ -456,7 +491,12 @@ class _Writer:
 
     def _monitor(self, monitor: Monitor) -> list[str]:
         axes = np.flatnonzero(monitor.direction)
-        if len(axes) != 1 or self.mesh is None or self.mesh.groups[monitor.where][0] != 0:
+        if (
+            monitor.plus
+            or len(axes) != 1
+            or self.mesh is None
+            or self.mesh.groups[monitor.where][0] != 0
+        ):
             return []
         return [f'*NODE OUTPUT, NSET="{monitor.where}"', f"U{axes[0] + 1}"]
 
@@ -473,9 +513,9 @@ class _Writer:
         elif isinstance(release, RampRelease) and release.increments is None and not old:
             head += ", DEBONDING FORCE=RAMP"
         elif not isinstance(release, StepRelease):
-            _refuse(f"interface '{title}': the release law {release}")
+            refuse(f"interface '{title}': the release law {release}")
         if debond.temperature is not None or debond.watch:
-            _refuse(f"interface '{title}': temperature= and watch= of a Debond")
+            refuse(f"interface '{title}': temperature= and watch= of a Debond")
         return [head, *lines, *criterion_lines(title, debond.criterion, nodal)]
 
 
@@ -483,43 +523,11 @@ def _group(face: str | Face) -> str:
     """Name of the group of facets of a side of an interface."""
     if isinstance(face, str):
         return face
-    _refuse("the face of a shell")
+    refuse("the face of a shell")
 
 
-def _refuse(what: str) -> NoReturn:
-    raise InputError(f"write_deck: {what}: a deck has no word for it")
-
-
-def _as_deck_step(scene: Scene, step: Static | Cycles, i: int) -> DeckStep:
+def _as_deck_step(scene: Scene, step: Static | Cycles | Explicit, i: int) -> DeckStep:
     return DeckStep(f"step {i + 1}", step, tuple(d.interface.title for d in scene.debonds))
-
-
-def _ends(steps: Sequence[DeckStep]) -> list[float]:
-    """Total time at the end of each step.
-
-    Raises:
-        InputError: A step does not end at a time, or proceeds in another way than by increments.
-    """
-    out: list[float] = []
-    for step in steps:
-        what = step.step
-        if isinstance(what, Cycles):
-            start = out[-1] if out else 0.0
-            if what.period is None or what.period[0] != start or what.ends:
-                _refuse(f"cycles {what} without a period that begins at time {start:g}")
-            assert what.period is not None
-            out.append(what.period[1])
-            continue
-        if isinstance(what, Dynamic) or what.stepping != "increment":
-            _refuse(
-                f"step '{step.name}' with stepping='{what.stepping}'"
-                f"{' (Dynamic)' if isinstance(what, Dynamic) else ''}, use stepping='increment'"
-            )
-        times = [e.time for e in what.ends if isinstance(e, Time)]
-        if len(times) != 1 or len(what.ends) != 1:
-            _refuse(f"step '{step.name}' that does not end at a Time alone")
-        out.append(times[0])
-    return out
 
 
 def _sides(cell: str, order: int) -> Ints:

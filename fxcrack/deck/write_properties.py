@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.materials import Isotropic, Material, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.criteria import (
@@ -34,12 +35,15 @@ def _row(values: list[float]) -> str:
 # -- materials -------------------------------------------------------------------------------------
 
 
-def material_lines(title: str, material: Material) -> tuple[list[str], list[str]]:
+def material_lines(
+    title: str, material: Material, inertia: Inertia | None = None
+) -> tuple[list[str], list[str]]:
     """Lines of a material, and of its orientation if it has one.
 
     Args:
         title: Name of both.
         material: The material.
+        inertia: Density of all bodies and damping, in a scene whose bodies move.
 
     Raises:
         InputError: A deck has no word for it.
@@ -82,6 +86,11 @@ def material_lines(title: str, material: Material) -> tuple[list[str], list[str]
     else:
         raise InputError(f"write_deck: material {material}: a deck has no word for it")
     density = getattr(material, "density", None)
+    if inertia is not None:
+        density = density if inertia.density is None else inertia.density
+        by_mass, by_stiffness = inertia.rayleigh
+        if by_mass or by_stiffness:
+            out.append(f"*DAMPING, ALPHA={number(by_mass)}, BETA={number(by_stiffness)}")
     if density is not None:
         out += ["*DENSITY", number(density)]
     if any(np.any(m.expansion) for _, m in tables):  # type: ignore[attr-defined]
@@ -123,6 +132,11 @@ def criterion_lines(title: str, criterion: Criterion, nodal: bool) -> list[str]:
             lines = [_row([row[0], 0.0, *t]) for row, t in _against_temperature(
                 [criterion.critical])]  # fmt: skip
     elif isinstance(criterion, CrackLengthVsTime):
+        if criterion.direction is not None:
+            raise InputError(
+                f"write_deck: interface '{title}': direction={criterion.direction} has no word in "
+                "a deck: lengths are measured from the reference point itself there"
+            )
         head = f'TYPE=CRACK LENGTH, NSET="{criterion.reference}", {tolerance}'
         pairs = zip(criterion.times, criterion.lengths, strict=True)
         lines = [_row([t, x]) for t, x in pairs]
@@ -152,9 +166,16 @@ def _rates(title: str, criterion: RateCriterion, nodal: bool) -> tuple[str, list
     given: list[object] = _filled(toughness) if not nodal else [0.0, 0.0, 0.0]
     if isinstance(criterion, Fatigue):
         p = criterion.paris
+        limits = () if p is None else (p.r1, p.r2)
+        constant = [r for r in limits if isinstance(r, float)]
+        if p is None or p.drive != "dG" or p.normalised or len(constant) < 2:
+            raise InputError(
+                f"write_deck: interface '{title}': a deck has words for a Paris law in dG with "
+                "constant threshold and upper limit only"
+            )
         if criterion.credit:
             raise InputError(f"write_deck: interface '{title}': credit=True has no word in a deck")
-        paris = [p.c1, p.c2, p.c3, p.c4, p.r1, p.r2]
+        paris = [p.c1, p.c2, p.c3, p.c4, *constant]
         rows = [[*paris, *row, *exponents, *t] for row, t in _against_temperature(given)]
         return f"TYPE=FATIGUE, {head}", _in_eights(rows)
     assert isinstance(criterion, VCCT)

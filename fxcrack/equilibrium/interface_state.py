@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import SolverError
-from fxcrack.condensation.mumps_schur import mumps_message
+from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF, mumps_message
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.coulomb import FrictionState, NodeStates
@@ -268,7 +268,10 @@ def _free_open(system: ContactSystem, pair: Pair, normals: Ints, free: Ints) -> 
         system.release(free)
     except NotPositiveDefinite as error:
         if not pair.interface.contact:
-            raise SolverError(mumps_message(-10, 0)) from error
+            if error.why == HELD_BY_ROUND_OFF:
+                raise SolverError(f"the open part cannot be opened: {error.why}") from error
+            why = f" ({error.why})" if error.why else ""
+            raise SolverError(f"{mumps_message(-10, 0)}{why}") from error
         normals = normals[normals >= 0]
         system.closed[normals] = True
         system.release(np.setdiff1d(free, normals))

@@ -9,6 +9,7 @@ of the prediction plus the correction e, whose value and rate are zero at the st
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -22,6 +23,9 @@ from fxcrack.equilibrium.moving_contact import ImpulseWork
 
 FINE = 1.0 / 512.0
 """Part of an increment, or of a bond force, that is not divided whatever the energies are."""
+
+_SMALLEST_PIECE = 1e-4
+"""Part of a bond force whose removal is the least that is tried at once."""
 
 
 class EnergyImbalance(ConvergenceError):
@@ -141,6 +145,29 @@ class TrialIncrement:
             self.friction,
             contact,
         )
+
+
+def in_pieces(go: Callable[[float, bool], None]) -> None:
+    """Go from 0 to 1 in as many pieces as the iteration needs.
+
+    Args:
+        go: Goes on to a fraction, and is told whether to refuse a piece whose energies do not
+            balance to the tolerance. Where it raises, nothing has changed.
+
+    Raises:
+        ConvergenceError: The smallest piece fails as well.
+    """
+    done, size = 0.0, 1.0
+    while done < 1.0:
+        to = min(done + size, 1.0)
+        try:
+            go(to, size > FINE)
+        except ConvergenceError as error:
+            size *= 0.5 if isinstance(error, EnergyImbalance) else 0.25
+            if size < _SMALLEST_PIECE:
+                raise
+        else:
+            done = to
 
 
 def _along(points: list[tuple[float, Equilibrium]], name: str) -> Array:

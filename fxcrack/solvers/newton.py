@@ -7,8 +7,6 @@ the end (:mod:`fxcrack.solvers.increment_work`).
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from petsc4py import PETSc
@@ -23,56 +21,28 @@ from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
-from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinates
+from fxcrack.interface.jump_coordinates import build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.can_fly import can_fly
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
-from fxcrack.solvers.increment_work import FINE, EnergyImbalance, IncrementWork, TrialIncrement
+from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
+from fxcrack.solvers.increment_work import (
+    EnergyImbalance,
+    IncrementWork,
+    TrialIncrement,
+    in_pieces,
+)
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
+from fxcrack.solvers.newton_state import NewtonState, ResumedTangent, part_of, tangent_arrays
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
 from fxcrack.solvers.trial import IncrementSolver
 
-_SMALLEST_PIECE = 1e-4
-"""Part of a bond force whose removal is the least that is tried at once."""
-_ANOTHER = 1e-2
-"""An equilibrium that is off by more than this part of the stored energy from the work of its
-increment, however short that is, does not lie on the way: SNES has found another solution."""
 _UNSTABLE = (
     "the equilibrium found is unstable (buckling, or a limit load was passed); take smaller "
     "increments, or control a displacement instead of a force"
 )
-
-
-@dataclass(frozen=True)
-class NewtonState:
-    """An accepted state to return to.
-
-    Attributes:
-        interfaces: State of the interfaces.
-        pairs: Their pairing.
-        u: Displacement, dofs owned by this rank.
-        terms: States of the form terms.
-        at: Time.
-        pairing_energy: Energy that new pairings have taken so far.
-    """
-
-    interfaces: InterfaceState
-    pairs: list[Pair]
-    u: Array
-    terms: list[dict[str, Array]]
-    at: float
-    pairing_energy: float
-
-
-class _Dense(NamedTuple):
-    """The dense system of a checkpoint, the numbering it is in, and its tangent's drift."""
-
-    numbers: list[Ints]
-    schur: Array
-    offset: Array
-    face_loads: Array
-    drift: float
 
 
 class NewtonSolver(InterfaceSolver):
@@ -98,10 +68,11 @@ class NewtonSolver(InterfaceSolver):
         at: Time of the accepted state.
         counts: Solves and iterations so far.
         largest_force: Largest norm of the internal forces of an accepted state, force.
-        largest_energy: The largest one stored in an accepted state that was asked for it.
+        energy: What is stored in the accepted state.
         pairing: Energy that new pairings of faces that slide have taken.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
+        free_start: Whether the motion began without an equilibrium, see :meth:`begin_motion`.
     """
 
     def __init__(
@@ -133,17 +104,15 @@ class NewtonSolver(InterfaceSolver):
         size = continuum.n_local, continuum.n_global
         self.u = PETSc.Vec().createMPI(size, comm=continuum.comm)
         self.at = 0.0
-        self.largest_force = self.largest_energy = 0.0
-        self._most_stored = 0.0  # in any accepted state: what is left of it is round-off
+        self.largest_force = 0.0
+        self.energy = StoredEnergy(bodies)
         self.pairing = PairingEnergy()
-        self.exact = False
+        self.exact = self.free_start = False
         self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: TrialIncrement | None = None
         self._last: IncrementWork | None = None  # of the last trial that was confirmed
-        self._energies: dict[str, float] | None = None  # of the accepted state, once asked for
-        self._resumed_dense: _Dense | None = None
-        self._resumed_origin: tuple[dict[str, Array], tuple[float, float]] | None = None
+        self._resumed_tangent: ResumedTangent | None = None
 
     # -- condensation --------------------------------------------------------------------
 
@@ -157,36 +126,23 @@ class NewtonSolver(InterfaceSolver):
         )
         self.timings.add("transform", start)
         self.bodies.set(self.u)
-        if self._resumed_origin is not None:
-            self._condense_again(coordinates, *self._resumed_origin)
-            self._resumed_origin = None
-        else:
+        if not self.bodies.dynamic:  # inertia holds every body
+            tangent.restraint = self.restraint(roles, coordinates)
+        if self._resumed_tangent is None:
             tangent.condense(coordinates)
+        else:
+            self._resumed_tangent.condense(tangent, coordinates, self.at)
         system = ContactSystem(
             tangent.condensation.schur, coordinates.n_retained, self.n_loads, n_forces,
             offset=np.zeros(coordinates.n_last),
         )  # fmt: skip
+        system.cholesky.restraint = tangent.restraint
         residual = tangent.out_of_balance(loads)
         jump = self.interfaces.jumps(self.u, coordinates)
         tangent.anchor(system, residual, jump, loads).destroy()
         residual.destroy()
         face_loads = -tangent.condensation.borders_on_retained[:, :n_forces]
         return Condensed(coordinates, system, face_loads)
-
-    def _condense_again(
-        self, coordinates: JumpCoordinates, origin: dict[str, Array], began: tuple[float, float]
-    ) -> None:
-        """Make the tangent that a checkpoint was written with where it was made; collective.
-
-        Bodies that depend on their history have another one in the accepted state.
-        """
-        accepted = self.bodies.snapshot()
-        self.bodies.begin(*began)
-        self.bodies.restore(origin)
-        self.tangent.condense(coordinates)
-        if not self.bodies.dynamic:
-            self.bodies.begin(self.at, 0.0)
-        self.bodies.reset(accepted)
 
     def _equilibrium(self, before: InterfaceState, force: Array) -> Equilibrium:
         jump = self.interfaces.jumps(self.u, self.tangent.coordinates)
@@ -198,12 +154,11 @@ class NewtonSolver(InterfaceSolver):
         Arguments as for :meth:`InterfaceSolver.prepare`.
         """
         super().prepare(active, reach)
-        dense, self._resumed_dense = self._resumed_dense, None
-        if dense is not None and all(map(np.array_equal, dense.numbers, self.index)):
-            # a resumed step goes on as it would have, to round-off
-            self.system.renew(dense.schur, dense.offset)
-            self.face_loads = dense.face_loads
-            self.tangent.drift = dense.drift
+        made, self._resumed_tangent = self._resumed_tangent, None
+        if made is not None and made.fits(self.index):
+            self.system.renew(made.schur, made.offset)
+            self.face_loads = made.face_loads
+            self.tangent.drift = made.drift
 
     def renew_pairs(self) -> bool:
         """Pair open nodes with the master surface where it is now; collective.
@@ -230,11 +185,27 @@ class NewtonSolver(InterfaceSolver):
 
     # -- trials --------------------------------------------------------------------------
 
+    def begin_motion(self, dt: float) -> None:
+        """Let bodies with inertia that nothing holds begin without an equilibrium; collective.
+
+        Before an increment of time the tangent holds no inertia, so that it is singular where a
+        body can move freely. There is then no equilibrium to begin with, and loads that are there
+        from the first moment are applied within the first increment.
+
+        Args:
+            dt: Length of the first increment, time.
+        """
+        inertia = self.bodies.inertia
+        if inertia is not None and can_fly(self.continuum, self.supports, self.pairs, self.fronts):
+            self.free_start = True
+            inertia.expect(dt)
+
     def start(self) -> None:
         """Find the equilibrium without loads; collective."""
         zero = np.zeros(self.system.n_retained)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
-        self._solve(zero)
+        if not self.free_start:
+            self._solve(zero)
 
     def _solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
@@ -274,7 +245,7 @@ class NewtonSolver(InterfaceSolver):
             ConvergenceError: None was found; the accepted state is in force again.
         """
         if self.bodies.closed:
-            self.stored(self.state)
+            self.energy.now()
         self._before = self.interface_state()
         dynamic = self.bodies.dynamic
         self._begun = dt > 0.0 or not dynamic
@@ -318,24 +289,12 @@ class NewtonSolver(InterfaceSolver):
             self._fail()
             raise ConvergenceError(_UNSTABLE) from error
         if strict is not None and trial.iterations and self.bodies.closed:
-            self._check_balance(trial, self.newton.balance if strict else _ANOTHER)
-
-    def _check_balance(self, trial: TrialIncrement, part: float) -> None:
-        """Refuse a trial whose energies are off by more than a part of what is stored."""
-        work = trial.work
-        assert work is not None and self._energies is not None
-        trial.energies = self.bodies.stored()
-        before, after = (sum(e.values()) for e in (self._energies, trial.energies))
-        given = work.external_work(len(self.loads)) + self.bodies.path_work()
-        given += self._overlap_work(work.start, work.end)
-        off = given - (after - before) - work.bonds - work.friction
-        size = max(after, self.largest_energy)
-        allowed = part * (size if part < _ANOTHER else max(size, self._most_stored))
-        if abs(off) > allowed + trial.noise:
-            self.revert()
-            raise EnergyImbalance(
-                f"the energies of an increment are off by {off:.2e} beside {size:.2e} stored"
-            )
+            overlap = self._overlap_work(trial.points[0][1], trial.end)
+            part = self.newton.balance if strict else ANOTHER
+            off = self.energy.imbalance(trial, len(self.loads), overlap, part)
+            if off:
+                self.revert()
+                raise EnergyImbalance(off)
 
     def commit(self) -> None:
         """The last trial becomes the accepted state; collective."""
@@ -348,8 +307,7 @@ class NewtonSolver(InterfaceSolver):
         self.largest_force = max(self.largest_force, self.tangent.force_scale)
         self.tangent.drift = trial.drift
         self.tangent.accept()
-        self._energies = trial.energies
-        self.largest_energy = max(self.largest_energy, sum((self._energies or {}).values()))
+        self.energy.accept(trial.energies)
         self.state, self._last = trial.end, trial.work
         self._give_up()
         if self.pairing.pending:
@@ -421,29 +379,20 @@ class NewtonSolver(InterfaceSolver):
         self.open(p, nodes)
         if self.bodies.dynamic:
             return 0.0, 0.0  # the force goes to zero over the next increment
-        energy, work, done, size = 0.0, 0.0, 0.0, 1.0
+        energy = work = 0.0
         begin = self.state.force
-        while done < 1.0:
-            to = min(done + size, 1.0)
+
+        def go(to: float, strict: bool) -> None:
+            nonlocal energy, work
             target = force if to == 1.0 else begin + to * (force - begin)
             here = self.state
-            try:
-                end = self.move(here.loads, target, self.at, 0.0, strict=size > FINE)
-            except EnergyImbalance:
-                size *= 0.5
-                if size < _SMALLEST_PIECE:
-                    raise
-                continue
-            except ConvergenceError:
-                size *= 0.25
-                if size < _SMALLEST_PIECE:
-                    raise
-                continue
+            end = self.move(here.loads, target, self.at, 0.0, strict=strict)
             more, out, _ = self.along(here, end)
             work, energy = work + more, energy + out
             self.book_contact(here, end)
             self.commit()
-            done = to
+
+        in_pieces(go)
         return energy, work
 
     def settle(self, force: Array) -> tuple[float, float, Array] | None:
@@ -481,7 +430,7 @@ class NewtonSolver(InterfaceSolver):
     def recall(self, saved: NewtonState) -> None:
         """Return to an earlier accepted state; collective."""
         self._give_up()
-        self._energies = None
+        self.energy.forget()
         here = min(self.continuum.comm.allgather(np.array_equal(self.u.array_r, saved.u)))
         self.u.array[:] = saved.u
         self.at = saved.at
@@ -507,26 +456,16 @@ class NewtonSolver(InterfaceSolver):
 
         Returns:
             What :meth:`InterfaceSolver.collect` gives; on rank 0 bodies.* of
-            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; dense.*, the dense system,
-            which need not be that of the accepted displacement: schur, shape (n_last, n_last),
-            offset, shape (n_last,), faces, shape (n_retained, n_forces); sums, shape (4,); where
-            bodies depend on their history tangent.*, the state in which the tangent was made, as
-            bodies.*, and began, shape (2,).
+            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (4,); and the
+            tangent, see :func:`~fxcrack.solvers.newton_state.tangent_arrays`.
         """
-        assert self.system.offset is not None
         out = super().collect()
         out |= {f"bodies.{name}": values for name, values in self.bodies.state().items()}
         for p, known in enumerate(self.interfaces.pairing()):
             out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
-        out["dense.schur"], out["dense.offset"] = self.system.schur, self.system.offset
-        out["dense.faces"] = self.face_loads
-        sums = self.pairing.energy, self.largest_force, self.largest_energy, self.tangent.drift
-        out["sums"] = np.array(sums)
-        origin = self.tangent.origin
-        if origin is not None:
-            made = self.bodies.state(origin.local)
-            out |= {f"tangent.{name}": values for name, values in made.items()}
-            out["began"] = np.array(origin.began)
+        drift, energy = self.tangent.drift, self.energy.largest
+        out["sums"] = np.array([self.pairing.energy, self.largest_force, energy, drift])
+        out |= tangent_arrays(self.tangent, self.system, self.face_loads)
         return out
 
     def resume(self, arrays: Arrays, time: float) -> None:
@@ -545,23 +484,15 @@ class NewtonSolver(InterfaceSolver):
         self.interfaces.restore_pairing(arrays, "pairing.{}[{}]")
         if self.continuum.temperature is not None:
             self.continuum.temperature.set(time)
-        bodies = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("bodies.")}
-        self.bodies.restore({name: values.astype(float) for name, values in bodies.items()})
+        self.bodies.restore(part_of(arrays, "bodies."))
         self.u.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
         self.interfaces.move_fronts(self.u)
         self.at = time
         sums = (float(x) for x in arrays["sums"])
-        self.pairing.energy, self.largest_force, self.largest_energy, drift = sums
-        if "began" in arrays:
-            made = {k.split(".", 1)[1]: v for k, v in arrays.items() if k.startswith("tangent.")}
-            end, dt = (float(x) for x in arrays["began"])
-            self._resumed_origin = {k: v.astype(float) for k, v in made.items()}, (end, dt)
+        self.pairing.energy, self.largest_force, self.energy.largest, drift = sums
         super().resume(arrays, time)
         assert self._resumed is not None
-        schur, offset, faces = (
-            arrays[f"dense.{name}"].astype(float) for name in ("schur", "offset", "faces")
-        )
-        self._resumed_dense = _Dense(self._resumed.index, schur, offset, faces, drift)
+        self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, drift)
 
     # -- energies and fields -------------------------------------------------------------
 
@@ -598,10 +529,7 @@ class NewtonSolver(InterfaceSolver):
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies in the accepted state, by name; collective."""
-        if self._energies is None:
-            self._energies = self.bodies.stored()
-        self._most_stored = max(self._most_stored, sum(self._energies.values()))
-        return self._energies
+        return self.energy.now()
 
     def spent(self) -> dict[str, float]:
         """Energies the bodies have turned into something else, by name; collective."""

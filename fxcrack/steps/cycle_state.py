@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools
+from fxcrack.criteria import CycleRates
 
 
 @dataclass(frozen=True)
@@ -16,17 +17,17 @@ class TipCycle:
     """One stabilised cycle at the tips of an interface.
 
     Attributes:
-        dG: Range of the total rate, shape (n,), force/length.
-        G_max: Its largest value, likewise.
-        G_c: Critical total rate at the mode mix of G_max, likewise.
-        dadN: Growth per cycle, shape (n,), length: by the Paris law, 0 below the threshold, the
-            whole element beyond the upper limit.
+        rates: Energy release rates at n front nodes.
+        dadN: Growth per cycle, shape (n,), length: by the law, 0 below the threshold, the whole
+            element beyond the upper limit.
     """
 
-    dG: Array
-    G_max: Array
-    G_c: Array
+    rates: CycleRates
     dadN: Array
+
+    def column(self, name: str) -> Array:
+        """G_max, dG, G_c or dadN, shape (n,)."""
+        return self.dadN if name == "dadN" else np.asarray(getattr(self.rates, name))
 
 
 _COLUMNS = ("N", "interface", "node", "a", "G_max", "dG", "G_c", "dadN", "released")
@@ -85,7 +86,7 @@ class FatigueState:
             released: Whether each tip is released at its end, shape (n,).
         """
         n = len(nodes)
-        rates = [getattr(cycle, name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
+        rates = [cycle.column(name).tolist() for name in ("G_max", "dG", "G_c", "dadN")]
         columns = [[N] * n, [interface] * n, nodes.tolist(), lengths, *rates, released.tolist()]
         for name, values in zip(_COLUMNS, columns, strict=True):
             self.table[name] += values

@@ -27,10 +27,12 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
 from fxcrack.criteria import (
     CycleJump,
+    CycleRates,
     Regime,
     cycle_jump,
     total,
 )
+from fxcrack.criteria.cycle_rates import joined
 from fxcrack.criteria.energy_release import RateEvaluator
 from fxcrack.criteria.evaluator import repeat_tips
 from fxcrack.equilibrium.contact import Equilibrium
@@ -46,7 +48,6 @@ from fxcrack.steps.element_growth import (
     after_jump,
     cycles_of,
     cyclic_parts,
-    joined,
     lengths_of,
     together,
 )
@@ -142,7 +143,7 @@ class _Cycling:
         for (g, v), cycle in zip(self._analysis.at_tips(), self._seen, strict=False):
             if len(v.tips):
                 for name in ("G_max", "dG", "dadN"):
-                    row[f"{name}[{g.title}]"] = float(getattr(cycle, name)[v.largest])
+                    row[f"{name}[{g.title}]"] = float(cycle.column(name)[v.largest])
         return row
 
     # -- one cycle -----------------------------------------------------------------------
@@ -248,19 +249,18 @@ class _Cycling:
         for i, (g, v) in enumerate(self._analysis.at_tips()):
             criterion, evaluator = cyclic_parts(g)
             if not len(v.tips):
-                out.append(TipCycle(*np.zeros((4, 0))))
+                out.append(TipCycle(CycleRates(*np.zeros((5, 0))), np.zeros(0)))
                 continue
             rates = [
                 rates_between(evaluator, v.tips, a.measured[i], b.measured[i])
                 for a, b in pairwise(way)
             ]
-            dG, top, critical = criterion.cycle(
-                np.concatenate(rates), evaluator.toughness[v.tips.node]
-            )
-            regime = criterion.paris.regime(top, critical)
-            growth = np.where(regime == Regime.PARIS, criterion.paris.growth_rate(dG), 0.0)
+            found = criterion.cycle(np.concatenate(rates), evaluator.toughness[v.tips.node])
+            law = criterion.growth_law
+            regime = law.regimes(found)
+            growth = np.where(regime == Regime.PARIS, law.growth(found), 0.0)
             growth = np.where(regime == Regime.UNSTABLE, advance(v.tips), growth)
-            out.append(TipCycle(dG, top, critical, growth))
+            out.append(TipCycle(found, growth))
         return out
 
     # -- over the cycles to the next release ---------------------------------------------
@@ -273,7 +273,7 @@ class _Cycling:
         cycles that are allowed do not suffice, nothing is released.
         """
         front, seen = self._front(), self._seen
-        tried = np.zeros(len(front.rates.dG), dtype=np.bool_)
+        tried = np.zeros(len(front.da), dtype=np.bool_)
         best: tuple[float, CycleJump] | None = None
         jump = self._jump(front, tried, np.inf)
         while jump.event == "growth" and (best is None or jump.cycles - front.N < best[0]):
@@ -333,10 +333,10 @@ class _Cycling:
         keep = np.repeat([c.credit for c in criteria], counts)
         return TipsBefore(
             N=fatigue.N,
-            law=together([c.paris for c in criteria], counts),
+            law=together([c.growth_law for c in criteria], counts),
             tips=tips,
             counts=counts,
-            rates=joined(self._seen),
+            rates=joined([c.rates for c in self._seen]),
             da=np.concatenate([advance(t) for t in tips]),
             grown=np.where(
                 keep, np.concatenate([fatigue.credit[p][nodes] for p, nodes in on]), 0.0
@@ -362,9 +362,11 @@ class _Cycling:
         rates = front.rates
         return cycle_jump(
             front.law,
-            np.where(stopped, 0.0, rates.dG),
-            np.where(stopped, 0.0, rates.G_max),
-            rates.G_c,
+            replace(
+                rates,
+                dG=np.where(stopped, 0.0, rates.dG),
+                G_max=np.where(stopped, 0.0, rates.G_max),
+            ),
             front.da,
             cycles=front.N,
             initiated=front.initiated,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy.typing as npt
 
@@ -49,6 +50,17 @@ class Debond:
     def release_chosen(self) -> bool:
         """Whether the release law was named, and is not the default."""
         return self.release is not _BY_DEFAULT
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is copied or sent to other ranks: a law that was not named stays unnamed."""
+        state = dict(self.__dict__)
+        if not self.release_chosen:
+            del state["release"]
+        return state
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take what :meth:`__getstate__` gave."""
+        self.__dict__.update({"release": _BY_DEFAULT} | state)
 
     def __post_init__(self) -> None:
         """Refuse what no model could mend."""

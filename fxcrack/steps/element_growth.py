@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.criteria import CycleJump, Fatigue, Paris, Rates, Regime, element_cycles
+from fxcrack.criteria import CycleJump, CycleRates, Fatigue, FatigueLaw, Regime, element_cycles
 from fxcrack.criteria.energy_release import RateEvaluator
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.interface.tips import Tips
@@ -24,7 +23,7 @@ class TipsBefore:
 
     Attributes:
         N: Cycles so far.
-        law: Constants of growth.
+        law: Law of onset and growth.
         tips: Per interface.
         counts: Number of tips of each interface.
         rates: The stabilised cycle.
@@ -38,10 +37,10 @@ class TipsBefore:
     """
 
     N: float
-    law: Paris
+    law: FatigueLaw
     tips: list[Tips]
     counts: list[int]
-    rates: Rates
+    rates: CycleRates
     da: Array
     grown: Array
     keep: Bools
@@ -49,16 +48,6 @@ class TipsBefore:
     tolerance: float
     lengths: list[list[float]]
     records: list[int]
-
-
-def joined(cycles: list[TipCycle]) -> Rates:
-    """Rates of the tips of all interfaces."""
-    return Rates(*(np.concatenate([getattr(c, k) for c in cycles]) for k in ("dG", "G_max", "G_c")))
-
-
-def _rates_of(cycle: TipCycle, rows: Ints) -> Rates:
-    """Rates of some tips of an interface."""
-    return Rates(cycle.dG[rows], cycle.G_max[rows], cycle.G_c[rows])
 
 
 def cycles_of(
@@ -89,8 +78,8 @@ def cycles_of(
         if not len(rows):
             continue
         criterion, _ = cyclic_parts(g)
-        law, tips = criterion.paris, before.tips[i]
-        first = begin = end = _rates_of(seen[i], rows)
+        law, tips = criterion.growth_law, before.tips[i]
+        first = begin = end = seen[i].rates.rows(rows)
         if after and len(now[i].tips):
             reached = now[i].tips
             # the tip that stands at the end of the element now
@@ -98,16 +87,16 @@ def cycles_of(
             aim = aim + g.front.surface.x[tips.node[rows]]
             away = np.linalg.norm(aim[:, None] - g.front.surface.x[reached.node], axis=2)
             found = away.argmin(axis=1)
-            end = _rates_of(after[i], found)
+            end = after[i].rates.rows(found)
             if criterion.method == "closure":
                 # exact closure gives means over elements: the tip is half an element before
                 d, next_d = tips.d_ahead[rows], advance(reached)[found]
                 half = d / (d + next_d)
                 begin, end = begin.at(end, -half), begin.at(end, half)
-        onset = np.maximum(law.onset_cycles(begin.dG) - before.N, 0.0)
+        onset = np.maximum(law.onset(begin) - before.N, 0.0)
         wait = np.where(before.initiated[part][rows], 0.0, onset)
         passed = element_cycles(law, begin, end, before.da[part][rows])
-        grown, pace = before.grown[part][rows], law.growth_rate(first.dG)
+        grown, pace = before.grown[part][rows], law.growth(first)
         spent = np.divide(grown, pace, out=np.zeros(len(rows)), where=pace > 0.0)
         out = min(out, float((wait + np.maximum(passed - spent, 0.0)).min()))
     return out
@@ -122,10 +111,10 @@ def after_jump(before: TipsBefore, jump: CycleJump, cycles: float) -> CycleJump:
         cycles: Cycles that were needed.
     """
     law, rates = before.law, before.rates
-    regime = law.regime(rates.G_max, rates.G_c)
+    regime = law.regimes(rates)
     moving = regime == Regime.PARIS
-    rate = np.where(moving, law.growth_rate(rates.dG), 0.0)
-    left = np.maximum(law.onset_cycles(rates.dG) - before.N, 0.0)
+    rate = np.where(moving, law.growth(rates), 0.0)
+    left = np.maximum(law.onset(rates) - before.N, 0.0)
     wait = np.where(before.initiated, 0.0, left)
     grown = before.grown + rate * np.maximum(cycles - wait, 0.0)
     return replace(
@@ -138,7 +127,7 @@ def after_jump(before: TipsBefore, jump: CycleJump, cycles: float) -> CycleJump:
 
 
 @dataclass(frozen=True)
-class _SideBySide(Paris):
+class _SideBySide:
     """Laws of several interfaces for the tips of all of them, one interface after the other.
 
     Attributes:
@@ -146,25 +135,31 @@ class _SideBySide(Paris):
         counts: Number of tips of each.
     """
 
-    laws: tuple[Paris, ...] = ()
-    counts: tuple[int, ...] = ()
+    laws: tuple[FatigueLaw, ...]
+    counts: tuple[int, ...]
 
-    def _each(self, name: str, *values: npt.ArrayLike) -> npt.NDArray[Any]:
-        parts = [np.split(np.asarray(v), np.cumsum(self.counts)[:-1]) for v in values]
-        each = zip(self.laws, *parts, strict=True)
-        return np.concatenate([getattr(law, name)(*part) for law, *part in each])
+    @property
+    def life_exponent(self) -> float:
+        """The largest of all."""
+        return max(law.life_exponent for law in self.laws)
 
-    def onset_cycles(self, dG: npt.ArrayLike) -> Array:
+    def _parts(self, cycle: CycleRates) -> list[tuple[FatigueLaw, CycleRates]]:
+        """Laws of interfaces with tips, and the cycle at these."""
+        rows = np.split(np.arange(len(cycle.dG)), np.cumsum(self.counts)[:-1])
+        return [(law, cycle.rows(r)) for law, r in zip(self.laws, rows, strict=True) if len(r)]
+
+    def onset(self, cycle: CycleRates) -> Array:
         """Cycles until growth starts."""
-        return self._each("onset_cycles", dG)
+        return np.concatenate([np.zeros(0), *(law.onset(c) for law, c in self._parts(cycle))])
 
-    def growth_rate(self, dG: npt.ArrayLike) -> Array:
+    def growth(self, cycle: CycleRates) -> Array:
         """Growth per cycle in the Paris regime."""
-        return self._each("growth_rate", dG)
+        return np.concatenate([np.zeros(0), *(law.growth(c) for law, c in self._parts(cycle))])
 
-    def regime(self, G_max: npt.ArrayLike, G_c: npt.ArrayLike) -> npt.NDArray[np.int64]:
+    def regimes(self, cycle: CycleRates) -> Ints:
         """Regime of each tip."""
-        return self._each("regime", G_max, G_c)
+        none = np.zeros(0, dtype=np.int64)
+        return np.concatenate([none, *(law.regimes(c) for law, c in self._parts(cycle))])
 
 
 def cyclic_parts(crack: Crack) -> tuple[Fatigue, RateEvaluator]:
@@ -175,16 +170,14 @@ def cyclic_parts(crack: Crack) -> tuple[Fatigue, RateEvaluator]:
     return cast(Fatigue, crack.criterion), cast(RateEvaluator, crack.evaluator)
 
 
-def together(laws: Sequence[Paris], counts: Sequence[int]) -> Paris:
+def together(laws: Sequence[FatigueLaw], counts: Sequence[int]) -> FatigueLaw:
     """One law for the tips of several interfaces, given one interface after the other.
 
     Args:
         laws: One per interface.
         counts: Number of tips of each.
     """
-    first = laws[0]
-    constants = (first.c1, first.c2, first.c3, first.c4, first.r1, first.r2)
-    return _SideBySide(*constants, laws=tuple(laws), counts=tuple(counts))
+    return _SideBySide(tuple(laws), tuple(counts))
 
 
 def advance(tips: Tips) -> Array:

@@ -1,0 +1,91 @@
+"""What a deck of dynamics must be like, looked at before the scene is made of it."""
+
+from __future__ import annotations
+
+from fxcrack.continuum.continuum_shell import ContinuumShell
+from fxcrack.continuum.materials import Plastic
+from fxcrack.deck.flat import Flat
+from fxcrack.deck.loads import Loads
+from fxcrack.deck.model import Model
+from fxcrack.deck.procedures import Procedure
+from fxcrack.deck.properties import Sections
+from fxcrack.deck.supports import Boundary
+from fxcrack.deck.thermal import Temperatures
+
+
+def check_density(procedure: Procedure, sections: Sections, model: Model) -> None:
+    """Refuse bodies without a density in a dynamic step.
+
+    Raises:
+        DeckError: Says which material has none.
+    """
+    for name, material in sections.materials.items():
+        if getattr(material, "density", None) is None:
+            procedure.card.fail(
+                f"the material of '{name}' has no *DENSITY, which moving bodies must have; add it"
+            )
+
+
+def check_explicit(
+    procedure: Procedure,
+    flat: Flat,
+    sections: Sections,
+    loads: Loads,
+    temperatures: Temperatures,
+    boundary: Boundary,
+) -> None:
+    """Refuse what explicit dynamics does not have.
+
+    Args:
+        procedure: The first explicit step.
+        flat: The model.
+        sections: Its materials.
+        loads: Its loads.
+        temperatures: Its temperatures.
+        boundary: Its prescribed displacements.
+
+    Raises:
+        DeckError: Says which, and what to do instead.
+    """
+    card = procedure.card
+    if any(isinstance(m, ContinuumShell) for m in sections.materials.values()):
+        card.fail(
+            "continuum shells are elements of the second order here, and explicit dynamics needs "
+            "the first; mesh the part with solids (C3D8 and *SOLID SECTION), or take implicit "
+            "*DYNAMIC"
+        )
+    if flat.kind.order != 1:
+        card.fail(
+            f"{flat.given_kind.name} elements of the second order are not possible in explicit "
+            "dynamics: their lumped masses would be negative; use first-order elements, or "
+            "implicit *DYNAMIC"
+        )
+    for family in flat.model.materials.values():
+        plastic = family.first("PLASTIC")
+        if plastic is not None and any(isinstance(m, Plastic) for m in sections.materials.values()):
+            plastic.fail("plasticity is not available in explicit dynamics; take implicit *DYNAMIC")
+        damping = family.first("DAMPING")
+        if damping is not None and sections.rayleigh[1]:
+            damping.fail(
+                "BETA shortens the increments of explicit dynamics far more than it damps; give "
+                "ALPHA alone"
+            )
+    if temperatures.first is not None:
+        temperatures.first.fail(
+            "temperatures are not available in explicit dynamics; leave them out"
+        )
+    for given in boundary.entries:
+        if given.value and given.curve is None and not (given.rate or given.fixed):
+            given.card.fail(
+                f"the displacement {given.value:g} of '{given.name}' jumps at the beginning of an "
+                "explicit step, with a velocity without bound; give it an AMPLITUDE"
+            )
+    entry = loads.following
+    if entry is not None:
+        entry.row.fail(
+            "a pressure follows the bodies where NLGEOM is on, which explicit dynamics does not "
+            "have; write NLGEOM=NO, or take *DSLOAD with TRVEC and FOLLOWER=NO"
+        )
+
+
+__all__ = ["check_density", "check_explicit"]

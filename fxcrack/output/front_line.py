@@ -1,0 +1,147 @@
+"""Quantities along a crack front as arrays against its arc length.
+
+The front separates open from bonded nodes. In a facet that it cuts, it enters through one edge with
+an open and a bonded end and leaves through another; followed from facet to facet, the bonded ends
+of these edges are the front nodes in order, whatever the mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.errors import InputError, unknown_name
+from fxcrack.interface.front import Front
+from fxcrack.interface.pairing import Interface
+from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
+
+_CORNERS = {"triangle": (0, 1, 2), "quadrilateral": (0, 1, 3, 2)}
+"""Corners of a facet along its outline, basix order."""
+
+
+@dataclass(frozen=True)
+class FrontLine:
+    """One connected part of a crack front, its nodes in order.
+
+    Attributes:
+        s: Arc length from its first node along straight lines between nodes of the undeformed
+            body, shape (n,), length.
+        x: Positions of the nodes in the undeformed body, shape (n, 3), length.
+        node: Slave nodes, shape (n,).
+        f: Value of the criterion, shape (n,).
+        values: Quantities of the criterion, each of shape (n,): "GI", "GII", "GIII" [force/length]
+            for those on energy release rates.
+        closed: Whether the last node is followed by the first.
+    """
+
+    s: Array
+    x: Array
+    node: Ints
+    f: Array
+    values: dict[str, Array]
+    closed: bool
+
+
+def front_lines(source: Analysis | HasAnalysis, interface: Interface | str) -> list[FrontLine]:
+    """Criterion and energy release rates along the front of a crack in the present state.
+
+    Each line begins at the end of the front with the smaller coordinates, so that the order does
+    not depend on numbering. The values are the same on every rank; collective.
+
+    Args:
+        source: A scene in three dimensions, or its analysis, after a step or in an observer.
+        interface: Interface or its name.
+
+    Returns:
+        Connected parts of the front, the longest first; none where no front is left.
+
+    Raises:
+        InputError: The interface is unknown or a line, or no step was run yet.
+
+    Example:
+        ``line = fx.front_lines(scene, "bond")[0]; plt.plot(line.s, line.values["GI"])``
+    """
+    analysis = analysis_of(source)
+    analysis.check_started("its front")
+    title = interface if isinstance(interface, str) else interface.title
+    crack = next((g for g in analysis.cracks if g.title == title), None)
+    if crack is None:
+        unknown_name("debond of interface", title, [g.title for g in analysis.cracks])
+    front = crack.front
+    if front.surface.dim == 1:
+        raise InputError(
+            f"interface '{title}' is a line: its front is a point; its rates are columns of the "
+            "history"
+        )
+    tips = crack.tips()
+    if not len(tips):
+        return []
+    values = crack.evaluate(tips, analysis.solver.state, analysis.time)
+    row_of = {int(node): i for i, node in enumerate(values.tips.node)}
+    x = analysis.pairs[crack.p].surface.x
+    out = []
+    for nodes, closed in ordered_fronts(front, x):
+        kept = [n for n in nodes if n in row_of]
+        if not kept:
+            continue
+        rows, at = np.array([row_of[n] for n in kept]), np.array(kept)
+        steps = np.linalg.norm(np.diff(x[at], axis=0), axis=1)
+        out.append(
+            FrontLine(
+                s=np.concatenate([[0.0], np.cumsum(steps)]),
+                x=x[at].copy(),
+                node=at,
+                f=values.f[rows],
+                values={name: v[rows] for name, v in values.report.items()},
+                closed=closed,
+            )
+        )
+    return sorted(out, key=lambda line: -float(line.s[-1]))
+
+
+def ordered_fronts(front: Front, points: Array) -> list[tuple[list[int], bool]]:
+    """Front nodes of a surface in order, each connected part with whether it is closed.
+
+    A node that the front passes twice is listed once, where it is passed first.
+
+    Args:
+        front: The front.
+        points: Positions of the slave nodes, shape (n_nodes, 3), that decide where a line begins.
+    """
+    surface, bonded = front.surface, front.bonded
+    corners = surface.facets[:, _CORNERS[surface.kind]]
+    cut = np.flatnonzero(bonded[corners].any(axis=1) & ~bonded[corners].all(axis=1))
+    joins: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for around in corners[cut].tolist():
+        n = len(around)
+        # (bonded end, open end) of each edge at which a run of bonded corners begins or ends
+        begins = [i for i in range(n) if bonded[around[i]] and not bonded[around[i - 1]]]
+        for i in begins:
+            j = i
+            while bonded[around[(j + 1) % n]]:
+                j += 1
+            one = (around[i], around[i - 1])
+            two = (around[j % n], around[(j + 1) % n])
+            joins.setdefault(one, []).append(two)
+            joins.setdefault(two, []).append(one)
+    # whole numbers, so that round-off in the positions has no say
+    x = np.rint(points / (1e-7 * np.ptp(points, axis=0).max())).astype(np.int64).tolist()
+    place = {edge: (x[edge[0]], x[edge[1]]) for edge in joins}
+    left = set(joins)
+    out: list[tuple[list[int], bool]] = []
+    while left:
+        ends = [e for e in left if sum(n in left for n in joins[e]) < 2]
+        here = min(ends or left, key=place.__getitem__)
+        closed, path = not ends, [here]
+        left.discard(here)
+        while True:
+            following = [e for e in joins[here] if e in left]
+            if not following:
+                break
+            here = min(following, key=place.__getitem__)
+            path.append(here)
+            left.discard(here)
+        out.append((list(dict.fromkeys(edge[0] for edge in path)), closed))
+    return out

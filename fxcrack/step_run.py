@@ -1,0 +1,238 @@
+"""A step of a scene: whether it can be run, the state it begins in, its driver, its costs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fxcrack.base import log
+from fxcrack.base.checks import is_function, list_of
+from fxcrack.base.errors import InputError
+from fxcrack.base.together import meet
+from fxcrack.continuum.inertia import Inertia
+from fxcrack.history import Row
+from fxcrack.interface.front import why_no_tip
+from fxcrack.interface.supports import warn_of_held_bonds
+from fxcrack.restart.checkpoint import Checkpoint
+from fxcrack.restart.manager import RestartManager, RunFiles
+from fxcrack.solvers.explicit import ExplicitSolver
+from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.cycles import Cycles, check_criteria
+from fxcrack.steps.cyclic import run_cycles
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.end_conditions import CrackLength, Time
+from fxcrack.steps.explicit import Explicit
+from fxcrack.steps.explicit_driver import run_explicit
+from fxcrack.steps.explicit_setup import prepare_explicit
+from fxcrack.steps.progress import Progress
+from fxcrack.steps.quasi_static import run_static
+from fxcrack.steps.rows import Observer
+from fxcrack.steps.static import Dynamic, Static
+
+
+def check_step(
+    analysis: Analysis, step: Static | Cycles | Explicit, chosen: Sequence[Debond]
+) -> None:
+    """Refuse a step that a scene cannot run.
+
+    Args:
+        analysis: The analysis of the scene.
+        step: The step.
+        chosen: Debonds that may grow in it.
+
+    Raises:
+        InputError: What is wrong with it.
+    """
+    for debond in chosen:
+        if debond not in analysis.debonds:
+            raise InputError(
+                f"debond of interface '{debond.interface.title}' is not part of the scene"
+            )
+    for end in step.ends:
+        if isinstance(end, Time) and end.time < analysis.time * (1.0 - 1e-12):
+            raise InputError(
+                f"Time({end.time:g}) is past: the scene is at time {analysis.time:g} already; give "
+                "a later end"
+            )
+    check_criteria(step, chosen)
+    if isinstance(step, Explicit):
+        return
+    effects, why = analysis.effects, analysis.plan.why
+    if isinstance(analysis.solver, ExplicitSolver):
+        raise InputError(
+            f"{type(step).__name__}: this scene has moved by explicit dynamics, and other "
+            "steps cannot follow; make another scene for them, scene.rebuilt()"
+        )
+    if isinstance(step, Dynamic) and not any(isinstance(e, Inertia) for e in effects):
+        raise InputError(
+            "Dynamic moves bodies that have inertia, and the scene has none; write "
+            "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
+        )
+    if isinstance(step, Cycles) and not analysis.linear:
+        raise InputError(
+            "fatigue steps need linear bodies, but this scene takes the nonlinear solver "
+            f"({'; '.join(why)}); leave that effect out, or run Static steps"
+        )
+
+
+def checked_observers(observers: object) -> Sequence[Observer]:
+    """The observers of a run as a list.
+
+    Raises:
+        InputError: They are not in a list, or one cannot be called.
+    """
+    found = list_of(observers)
+    if found is None:
+        raise InputError("run: observers must be a list; write observers=[...]")
+    for i, observe in enumerate(found):
+        if not is_function(observe):
+            raise InputError(
+                f"run: observers[{i}] is {type(observe).__name__}; give a function of (event, row)"
+            )
+    return found
+
+
+def run_step(
+    analysis: Analysis,
+    step: Static | Cycles | Explicit,
+    chosen: Sequence[Debond],
+    files: RunFiles,
+    *,
+    checkpoint: Checkpoint | None,
+    restart: bool,
+    save: str | Path | None,
+    progress: bool,
+    observers: Sequence[Observer],
+) -> int:
+    """Run a step, or go on with one; its rows and details are in the history then. Collective.
+
+    Args:
+        analysis: The analysis, with the solver for the step.
+        step: What to do and when to stop.
+        chosen: Debonds that may grow in it.
+        files: What the steps of the scene share.
+        checkpoint: Where and how often the state is saved.
+        restart: Continue from the checkpoint if there is one.
+        save: File that holds the history while the step runs.
+        progress: Show the progress on a terminal.
+        observers: Called with the name of every event and its row.
+
+    Returns:
+        Number of rows that were there before, those of a step that is resumed included.
+    """
+    may_grow = [d in chosen for d in analysis.debonds]
+    may_grow += [False] * (len(analysis.pairs) - len(analysis.debonds))
+    analysis.activate(chosen)
+    for g in analysis.active:
+        if not len(g.tips()):
+            log.warn("%s, so nothing can debond", why_no_tip(g.front))
+    tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
+    meet(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
+    restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
+    _prepare(analysis, restarts, may_grow, step)
+    first = len(analysis.history)
+    analysis.history.reason = restarts.finished or _drive(
+        analysis, step, restarts, progress=progress, observers=observers
+    )
+    analysis.history.details = _details(analysis)
+    return first
+
+
+def _prepare(
+    analysis: Analysis,
+    restarts: RestartManager,
+    may_grow: list[bool],
+    step: Static | Cycles | Explicit,
+) -> None:
+    """Condense around the present fronts and find the equilibrium to begin with."""
+    if isinstance(step, Explicit):
+        prepare_explicit(analysis, step, may_grow, resumes=restarts.resumes)
+        if restarts.resumes:
+            restarts.put_in_equilibrium()
+        return
+    solver = analysis.condensed
+    if not (restarts.resumes or analysis.started) and isinstance(step, Static):
+        solver.begin_motion(step.initial)
+    solver.prepare(may_grow, _reach(analysis, step))
+    if restarts.resumes:
+        restarts.put_in_equilibrium()
+    elif not analysis.started:
+        for pair, held in zip(analysis.pairs, solver.held_by_supports, strict=True):
+            warn_of_held_bonds(pair, held)
+        solver.start()
+        analysis.book_start()
+    analysis.started = True
+
+
+def _drive(
+    analysis: Analysis,
+    step: Static | Cycles | Explicit,
+    restarts: RestartManager,
+    *,
+    progress: bool,
+    observers: Sequence[Observer],
+) -> str:
+    """Run the step; returns why it ended."""
+    with restarts, Progress(analysis.comm, enabled=progress) as show:
+        every: list[Observer] = [show, *observers]
+
+        def tell(event: str, row: Row) -> None:
+            for observe in every:
+                observe(event, row)
+
+        controls: dict[str, Any] = {
+            "observer": tell,
+            "checkpoint_point": restarts.checkpoint_point if restarts.wanted else None,
+            "resume": restarts.progress,
+        }
+        if isinstance(step, Explicit):
+            solver = analysis.solver
+            assert isinstance(solver, ExplicitSolver)
+            reason = run_explicit(analysis, solver, step, **controls)
+        elif isinstance(step, Cycles):
+            reason = run_cycles(analysis, step, **controls)
+        else:
+            reason = run_static(analysis, step, **controls)
+        analysis.history.reason = reason
+        restarts.finish(reason)
+        return reason
+
+
+def _details(analysis: Analysis) -> dict[str, Any]:
+    """What else is worth keeping with the history, plain types only."""
+    solver = analysis.solver
+    details: dict[str, Any] = {
+        "dofs": analysis.continuum.n_global,
+        "releases": sum(g.n_released for g in analysis.cracks),
+        "factorizations": solver.timings.factorizations,
+        "ranks": analysis.comm.size,
+        "seconds": dict(solver.timings.seconds),
+    }
+    if isinstance(solver, ExplicitSolver):
+        return details | solver.about()
+    system = analysis.condensed.system
+    details |= {"window": system.n_retained, "contact_steps": system.contact_steps}
+    if analysis.fatigue.table["N"]:
+        details["tips"] = analysis.fatigue.table
+    return details
+
+
+def _reach(analysis: Analysis, step: Static | Cycles | Explicit) -> list[float]:
+    """How far each crack may grow in a step, length."""
+    out = [np.inf] * len(analysis.pairs)
+    for end in step.ends:
+        if isinstance(end, CrackLength):
+            for g in analysis.cracks:
+                if g.debond.interface is end.interface:
+                    ahead = end.length - g.extent.length(g.tips())
+                    size = analysis.pairs[g.p].surface.facet_size
+                    if analysis.mesh.gdim == 3:
+                        ahead *= 1.1
+                    out[g.p] = max(ahead, 0.0) + 2.5 * size
+    return out
+
+
+__all__ = ["check_step", "checked_observers", "run_step"]

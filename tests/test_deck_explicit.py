@@ -1,0 +1,261 @@
+"""Decks of explicit dynamics: general contact with bonds that fail, masses, velocities."""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+import pytest
+
+import fxcrack as fx
+from fxcrack.criteria import ProgressiveRelease
+from fxcrack.deck.cards import DeckError
+from fxcrack.meshes.dcb import dcb_2d
+from tests.decks import BONDED, PLATE, read, write
+from tests.test_deck_write import round_trip, scene
+
+BARS = BONDED.split("*CONTACT PAIR")[0] + "*DENSITY\n1.\n"
+GLUE = """*SURFACE INTERACTION, NAME=GLUE
+*FRICTION
+0.1
+*COHESIVE BEHAVIOR
+1e6, 1e6, 1e6
+*FRACTURE CRITERION, TYPE=VCCT
+0.5, 1.0, 1.0, 2.0
+*CONTACT CLEARANCE, NAME=Clear, SEARCH NSET=BOND
+*AMPLITUDE, NAME=A
+0., 0., 1., 0.5, 2., 2.
+"""
+EXPLICIT = """*STEP, NLGEOM=NO
+*DYNAMIC, EXPLICIT
+, 2.
+*BOUNDARY, AMPLITUDE=A
+11, 1, 1
+11, 2, 2, 0.1
+21, 1, 1
+21, 2, 2, -0.1
+*CONTACT
+*CONTACT INCLUSIONS
+TOP, BOTTOM
+*CONTACT PROPERTY ASSIGNMENT
+TOP, BOTTOM, GLUE
+*CONTACT CLEARANCE ASSIGNMENT
+TOP, BOTTOM, CLEAR
+*OUTPUT, HISTORY, TIME INTERVAL=0.1
+*ENERGY OUTPUT
+ALLSE
+*END STEP
+"""
+DECK = BARS + GLUE + EXPLICIT
+
+
+def same_in_python(deck: fx.Scene) -> fx.Scene:
+    """The scene of the deck by hand, on its mesh."""
+    bond = fx.Interface(
+        "TOP", "BOTTOM", bonded=lambda x: x[0] > 0.5, contact=True, friction=0.1, name="TOP"
+    )
+    moves = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 0.5, 2.0))
+    return fx.Scene(
+        deck.mesh,
+        materials=fx.Isotropic(1000.0, 0.3, density=1.0),
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("11", x=0.0, y=0.1, amplitude=moves),
+            fx.Displacement("21", x=0.0, y=-0.1, amplitude=moves),
+        ],
+        debonds=[fx.Debond(bond, fx.VCCT(0.5, 1.0, mix=fx.BK(2.0)))],
+        effects=[fx.Inertia()],
+    )
+
+
+def test_a_deck_and_the_scene_in_python_give_the_same_history(tmp_path):
+    deck = fx.read_deck(write(tmp_path, DECK))
+    assert deck.steps[0].grow == ("TOP",) and deck.steps[0].step.rows == 20
+    assert not deck.scene.debonds[0].release_chosen  # progressive, as is the default there
+    by_hand = same_in_python(deck.scene)
+    found = deck.run()
+    wanted = by_hand.run(fx.Explicit(until=fx.Time(2.0), rows=20))
+    assert found.rows[-1]["released[TOP]"] == wanted.rows[-1]["released[TOP]"] > 0
+    assert len(found) == len(wanted)
+    for column in ("R[11.y]", "R[21.y]", "u[11.y]", "a[TOP]", "strain_energy", "kinetic_energy"):
+        size = np.abs(wanted[column]).max()
+        assert found[column] == pytest.approx(wanted[column], rel=1e-10, abs=1e-10 * size)
+    said = "\n".join(deck.report.replaced)
+    assert "the stiffness of the bonds is left out" in said and "released progressively" in said
+
+
+def test_a_law_that_was_not_chosen_stays_so_on_other_ranks_and_in_copies():
+    bond = fx.Interface("a", "b", bonded=lambda x: x[0] > 0.0)
+    debond = copy.deepcopy(fx.Debond(bond, fx.VCCT(0.5)))
+    assert not debond.release_chosen and debond.release == fx.StepRelease()
+    chosen = copy.deepcopy(fx.Debond(bond, fx.VCCT(0.5), ProgressiveRelease()))
+    assert chosen.release_chosen and chosen.release == ProgressiveRelease()
+
+
+def test_controls_of_the_step(tmp_path):
+    def step(head, cards=""):
+        text = DECK.replace("*DYNAMIC, EXPLICIT\n, 2.\n", head + cards)
+        return read(tmp_path, text).steps[0].step
+
+    plain = step("*DYNAMIC, EXPLICIT\n, 2.\n")
+    assert (plain.end_time, plain.safety, plain.dt, plain.mass_scale) == (2.0, 0.97, None, 1.0)
+    assert step("*DYNAMIC, EXPLICIT, SCALE FACTOR=0.5\n, 2.\n").safety == 0.485
+    assert step("*DYNAMIC, EXPLICIT, DIRECT USER CONTROL\n1E-3, 2.\n").dt == 1e-3
+    scaled = step("*DYNAMIC, EXPLICIT\n, 2.\n", "*FIXED MASS SCALING, FACTOR=4.\n")
+    assert (scaled.mass_scale, scaled.dt) == (4.0, None)
+    added = "*VARIABLE MASS SCALING, TYPE=BELOW MIN, DT=0.01, FREQUENCY=10\n"
+    scaled = step("*DYNAMIC, EXPLICIT\n, 2.\n", added)
+    assert (scaled.mass_scale, scaled.dt) == ("dt", 0.01)
+    # NLGEOM is on where an explicit step says nothing
+    found = read(tmp_path, DECK.replace(", NLGEOM=NO", ""))
+    assert any(isinstance(e, fx.FiniteStrain) for e in found.arguments["effects"])
+    assert any("NLGEOM is on" in line for line in found.report.replaced)
+
+
+def test_all_exterior_with_named_pairs(tmp_path):
+    text = DECK.replace("*CONTACT INCLUSIONS\nTOP, BOTTOM", "*CONTACT INCLUSIONS, ALL EXTERIOR")
+    found = read(tmp_path, text)
+    assert any("'TOP' on 'BOTTOM'" in line for line in found.report.replaced)
+    assert len(found.arguments["debonds"]) == 1
+    # the second field of the assignment may say that the first surface is the master
+    turned = text.replace("TOP, BOTTOM, CLEAR", "BOTTOM, TOP, CLEAR, MAIN")
+    assert read(tmp_path, turned).arguments["debonds"][0].interface.slave == "TOP"
+
+
+def test_a_bonded_set_without_a_criterion_separates(tmp_path, caplog):
+    plain = GLUE.replace(GLUE[GLUE.index("*COHESIVE") : GLUE.index("*CONTACT C")], "")
+    found = read(tmp_path, BARS + plain + EXPLICIT)
+    (interface,) = found.arguments["bonds"]
+    assert not found.arguments["debonds"] and not interface.bonded(np.zeros((3, 2))).any()
+    assert "they are not bonded and separate without stress" in caplog.text
+
+
+def test_a_surface_that_ends_with_the_bonded_set_is_warned_of(tmp_path, caplog):
+    text = DECK.replace("*NSET, NSET=BOND\n2, 3, 4, 5", "*NSET, NSET=BOND\n1, 2, 3, 4, 5")
+    deck = fx.read_deck(write(tmp_path, text))
+    deck.run()
+    assert "has no crack tip" in caplog.text
+    assert deck.scene.history.rows[-1]["released[TOP]"] == 0
+
+
+@pytest.mark.parametrize(
+    "old, new, words",
+    [
+        (", 2.\n*BOUND", "\n*BOUND", "the length of the step is missing"),
+        ("EXPLICIT\n", "EXPLICIT, ADIABATIC\n", "ADIABATIC is not available"),
+        ("EXPLICIT\n", "EXPLICIT, SCALE FACTOR=2.\n", "SCALE FACTOR=2 must lie above 0"),
+        (", 2.\n*B", ", 2.\n*FIXED MASS SCALING, FACTOR=4., ELSET=UPPER\n*B", "leave ELSET out"),
+        (", 2.\n*B", ", 2.\n*FIXED MASS SCALING, DT=1.\n*B", "TYPE=UNIFORM is not available"),
+        (", 2.\n*B", ", 2.\n*FIXED MASS SCALING\n*B", "give FACTOR, or DT"),
+        ("TYPE=VCCT", "TYPE=ENHANCED VCCT", "TYPE=ENHANCED VCCT is not possible in explicit"),
+        ("TYPE=VCCT", "TYPE=FATIGUE", "TYPE=FATIGUE is not possible in explicit"),
+        ("TYPE=VCCT", "TYPE=COD", "TYPE=COD is not possible in explicit"),
+        ("TYPE=VCCT", "TYPE=VCCT, VISCOSITY=1.", "belong to quasi-static steps"),
+        ("SEARCH NSET=BOND", "SEARCH NSET=BOND, SEARCH ABOVE=1.", "SEARCH NSET excludes"),
+        ("SEARCH NSET=BOND", "SEARCH ABOVE=1.", "no bonded nodes are named"),
+        ("SEARCH NSET=BOND", "SEARCH NSET=BOND, CLEARANCE=0.1", "a clearance other than 0"),
+        ("*FRACTURE CRITERION, TYPE=VCCT\n0.5, 1.0, 1.0, 2.0\n", "", "elastic bonds that never"),
+        ("*COHESIVE BEHAVIOR\n1e6, 1e6, 1e6\n", "", "directly after \\*COHESIVE BEHAVIOR"),
+        ("BOTTOM, CLEAR", "BOTTOM, CLAER", "there is no \\*CONTACT CLEARANCE, NAME=CLAER"),
+        ("BOTTOM, GLUE", "BOTTOM, GLEU", "there is no surface interaction 'GLEU'"),
+        ("INCLUSIONS\nTOP, BOTTOM", "INCLUSIONS\nTOP, TOP", "contact of a surface with itself"),
+        ("11, 2, 2, 0.1", "11, 2, 2, 0.1\n*DEBOND, SLAVE=TOP, MASTER=BOTTOM", "quasi-static steps"),
+        ("*DENSITY\n1.\n", "", "has no \\*DENSITY"),
+        ("*DENSITY", "*DAMPING, BETA=1E-3\n*DENSITY", "BETA shortens the increments"),
+        ("*DENSITY", "*PLASTIC\n1.\n*DENSITY", "plasticity is not available in explicit"),
+        ("*BOUNDARY, AMPLITUDE=A", "*BOUNDARY", "jumps at the beginning of an explicit step"),
+        ("*BOUND", "*TEMPERATURE\n1, 5.\n*BOUND", "temperatures are not available in explicit"),
+        ("CPE4", "CPE4H", None),
+        ("*STEP, NLGEOM=NO\n*DYN", "*STEP\n*DYNAMIC\n0.1, 1.\n*END STEP\n*STEP\n*DYN", "as two"),
+    ],
+)
+def test_decks_that_are_refused(tmp_path, old, new, words):
+    assert old in DECK
+    if words is None:
+        read(tmp_path, DECK.replace(old, new))
+        return
+    with pytest.raises(DeckError, match=words) as caught:
+        read(tmp_path, DECK.replace(old, new))
+    assert "model.inp, line" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "cards, words",
+    [
+        ("*BULK VISCOSITY\n", "it belongs to explicit dynamics"),
+        ("*FIXED MASS SCALING, FACTOR=2.\n", "it belongs to explicit dynamics"),
+        ("*CONTACT\n", "general contact belongs to explicit dynamics"),
+    ],
+)
+def test_cards_that_belong_to_explicit_dynamics(tmp_path, cards, words):
+    text = PLATE + f"*STEP\n*STATIC\n*BOUNDARY\nLEFT, 1, 2\n{cards}*END STEP\n"
+    with pytest.raises(DeckError, match=words):
+        read(tmp_path, text)
+
+
+VELOCITY = "*INITIAL CONDITIONS, TYPE=VELOCITY\nALL, 1, 3.\n"
+MOVING = PLATE.replace("200., 0.25", "200., 0.25\n*DENSITY\n2.") + VELOCITY
+
+
+def test_bodies_begin_with_a_velocity(tmp_path):
+    boundary = EXPLICIT[EXPLICIT.index("*BOUNDARY") : EXPLICIT.index("*CONTACT\n")]
+    flight = EXPLICIT.replace(boundary, "*NODE PRINT, NSET=BOND\nU1\n")
+    deck = fx.read_deck(write(tmp_path, BARS + GLUE + VELOCITY + flight))
+    last = deck.run().rows[-1]
+    # free flight of two bars of mass 4 over the time 2
+    assert last["kinetic_energy"] == pytest.approx(0.5 * 8.0 * 9.0, rel=1e-10)
+    assert last["m[U1 BOND]"] == pytest.approx(6.0, rel=1e-10)
+    deck.scene.close()
+
+
+def test_velocities_that_vary_and_those_that_cannot_be(tmp_path):
+    step = "*STEP\n*DYNAMIC\n0.1, 1.\n*END STEP\n"
+    found = read(tmp_path, MOVING.replace("ALL, 1, 3.", "LEFT, 2, 1.\nRIGHT, 2, 5.") + step)
+    (effect,) = (e for e in found.arguments["effects"] if isinstance(e, fx.Inertia))
+    assert effect.velocity[0] == 0.0
+    x = np.array([[0.0, 1.0, 2.0], [0.0, 0.0, 1.0], [0.0, 0.0, 0.0]])
+    assert effect.velocity[1](x) == pytest.approx([1.0, 0.0, 5.0])
+    with pytest.raises(DeckError, match="in dynamic steps only"):
+        read(tmp_path, MOVING + "*STEP\n*STATIC\n*END STEP\n")
+    with pytest.raises(DeckError, match="component 6 of a velocity"):
+        read(tmp_path, MOVING.replace("ALL, 1, 3.", "ALL, 6, 3.") + step)
+    faces = DECK.replace(
+        "*STEP", "*INITIAL CONDITIONS, TYPE=VELOCITY\n3, 2, 1.\n33, 2, 2.\n*STEP", 1
+    )
+    with pytest.raises(DeckError, match="have different velocities"):
+        read(tmp_path, faces)
+
+
+def test_what_is_written_gives_the_same_history(tmp_path):
+    moving = {"materials": fx.Isotropic(70e3, 0.3), "supports": [
+        fx.Displacement("far_upper", x=0.0, y=0.0), fx.Displacement("far_lower", x=0.0, y=0.0)],
+        "loads": [fx.PointForce("pin_top", (0.0, 60.0)), fx.PointForce("pin_bottom", (0.0, -60.0))],
+    }  # fmt: skip
+    step = fx.Explicit(until=fx.Time(1e-4), rows=5, safety=0.9, mass_scale=3.0)
+    effects = [
+        fx.Inertia(density=2.7e-9, rayleigh=(5.0, 0.0), velocity=(0.5, lambda x: 0.1 * x[0]))
+    ]
+    one = scene(dcb_2d(dx=10.0, ny=1), interface={"friction": 0.2}, effects=effects, **moving)
+    deck = round_trip(tmp_path / "a.inp", one, [step], rel=1e-9)
+    assert deck.steps[0].step.safety == pytest.approx(0.9)
+    effects = [fx.Inertia.hht(-0.1, density=2.7e-9)]
+    one = scene(dcb_2d(dx=10.0, ny=1), effects=effects, **moving)
+    # Newton's method ends at another residual after another numbering of the unknowns
+    round_trip(tmp_path / "b.inp", one, [fx.Dynamic(until=fx.Time(1e-4), dt=2e-5)], rel=1e-8)
+
+
+@pytest.mark.parametrize(
+    "change, words",
+    [
+        ({"step": {"start": "equilibrium"}}, "start='equilibrium'"),
+        ({"step": {"contact": "penalty"}}, "contact='penalty'"),
+        ({"release": fx.StepRelease()}, "the release law StepRelease"),
+        ({"interface": {"gap": "keep"}}, "gap='keep'"),
+        ({"criterion": fx.VCCT(0.2, viscosity=0.1)}, "viscosity and unstable_tolerance"),
+    ],
+)
+def test_explicit_scenes_that_a_deck_has_no_word_for(tmp_path, change, words):
+    step = fx.Explicit(until=fx.Time(1e-4), **change.pop("step", {}))
+    one = scene(dcb_2d(dx=10.0, ny=1), effects=[fx.Inertia(density=1e-9)], **change)
+    with pytest.raises(fx.InputError, match=words):
+        fx.write_deck(one, [step], tmp_path / "a.inp")
