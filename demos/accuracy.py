@@ -86,7 +86,7 @@ def dcb3d(setting: Setting) -> Case:
         load = float(history.rows[-1]["R[pin_top.y]"])
         return Measured(load=load * float(np.sqrt(G_IC / mean)), G=mean * (50.0 / load) ** 2)
 
-    # nothing grows before that time; the length says how little of the bond the window needs
+    # nothing grows before that time; the length says how little of the bond is retained
     return Case(scene, fx.Static(until=(fx.Time(0.5), fx.CrackLength(bond, 30.1))), measure)
 
 

@@ -289,7 +289,9 @@ def _scale(
 def cost(
     dofs: Annotated[str, typer.Option(help="Displacement dofs.")] = "1e6,1e7,1e8",
     dim: Annotated[int, typer.Option(help="2 or 3.")] = 3,
-    window: Annotated[float, typer.Option(help="Jump components that open or are watched.")] = 2e3,
+    retained: Annotated[
+        float, typer.Option(help="Retained jumps: components that open or are watched.")
+    ] = 2e3,
     releases: Annotated[float, typer.Option(help="Events.")] = 500.0,
     shape: Annotated[str, typer.Option(help="block (compact) or plate (slender).")] = "block",
     ranks: Annotated[int | None, typer.Option(help="Ranks [as many as memory asks for].")] = None,
@@ -299,12 +301,16 @@ def cost(
     constants: Annotated[
         Path | None, typer.Option(help="File of 'bench scale --store' [the shipped one].")
     ] = None,
+    window: Annotated[float | None, typer.Option(hidden=True)] = None,
 ) -> None:
     """Say what an analysis will cost, on how many ranks, and by which solver."""
     from fxcrack.bench.cost import Task, advise
     from fxcrack.bench.tables import show_cost
     from fxcrack.condensation.cost_laws import Constants, shipped
 
+    if window is not None:
+        log.warn("--window is now called --retained; the former name will be removed")
+        retained = window
     if memory is not None:
         positive("cost", memory=memory)
     measured = shipped() if constants is None else Constants.read(constants)
@@ -313,7 +319,7 @@ def cost(
         sizes = [float(n) for n in dofs.split(",")]
     except ValueError as error:
         raise InputError(f"dofs = '{dofs}': give numbers with commas") from error
-    tasks = [Task(n, dim, window, releases, shape) for n in sizes]
+    tasks = [Task(n, dim, retained, releases, shape) for n in sizes]
     found = [
         (task, advise(task, bytes_per_rank=each, ranks=ranks, constants=measured)) for task in tasks
     ]

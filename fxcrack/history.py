@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import csv
 import json
+import warnings
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -33,6 +34,25 @@ from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
 
 Row = dict[str, float | int | str]
+
+
+_FORMER_DETAILS = {"window": "retained"}
+"""Former names of details; they are removed in the next release."""
+
+
+class Details(dict[str, Any]):
+    """What else is worth keeping with a history, by name; former names warn."""
+
+    def __missing__(self, name: str) -> Any:
+        if name not in _FORMER_DETAILS:
+            raise KeyError(name)
+        new = _FORMER_DETAILS[name]
+        warnings.warn(
+            f"details['{name}'] is now called details['{new}']; the former name will be removed",
+            DeprecationWarning,
+            stacklevel=2,
+        )
+        return self[new]
 
 
 class History:
@@ -51,7 +71,7 @@ class History:
         self._comm = comm
         self.rows: list[Row] = []
         self.reason = ""
-        self.details: dict[str, Any] = {}
+        self.details = Details()
 
     @property
     def comm(self) -> MPI.Comm:

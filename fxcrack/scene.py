@@ -12,7 +12,7 @@ import numpy as np
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import check_instance, check_list, flag
 from fxcrack.base.errors import InputError
-from fxcrack.base.together import inside, meet
+from fxcrack.base.together import check_same_call, in_collective_call
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
@@ -112,10 +112,14 @@ class Scene:
             newton=newton,
         )
         given = {f.name: getattr(self.input, f.name) for f in fields(self.input)}
-        meet(mesh.comm, "Scene(...)", given | {"mesh": f"'{mesh.name}' of {mesh.gdim} dimensions"})
+        check_same_call(
+            mesh.comm, "Scene(...)", given | {"mesh": f"'{mesh.name}' of {mesh.gdim} dimensions"}
+        )
         self.analysis = compose(self.input)
         found = [(pair.bonded, pair.friction) for pair in self.pairs]
-        meet(mesh.comm, "Scene(...)", {"bonded nodes and friction of the interfaces": found})
+        check_same_call(
+            mesh.comm, "Scene(...)", {"bonded nodes and friction of the interfaces": found}
+        )
         self._files = RunFiles()
 
     def rebuilt(self, **changes: Any) -> Scene:
@@ -244,8 +248,8 @@ class Scene:
             **{"save": save, "checkpoint": checkpoint, "restart": restart},
             "observers": len(observers),
         }
-        meet(self.mesh.comm, "Scene.run", given)
-        with inside():
+        check_same_call(self.mesh.comm, "Scene.run", given)
+        with in_collective_call():
             return self._run(step, chosen, accuracy, save, checkpoint, progress, restart, observers)
 
     def _run(

@@ -11,9 +11,9 @@ import numpy as np
 from fxcrack.base import log
 from fxcrack.base.checks import is_function, list_of
 from fxcrack.base.errors import InputError
-from fxcrack.base.together import meet
+from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.history import Row
+from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.supports import warn_of_held_bonds
 from fxcrack.restart.checkpoint import Checkpoint
@@ -130,7 +130,7 @@ def run_step(
         if not len(g.tips()):
             log.warn("%s, so nothing can debond", why_no_tip(g.front))
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
-    meet(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
+    check_same_call(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
     restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
     _prepare(analysis, restarts, may_grow, step)
     first = len(analysis.history)
@@ -201,20 +201,22 @@ def _drive(
         return reason
 
 
-def _details(analysis: Analysis) -> dict[str, Any]:
+def _details(analysis: Analysis) -> Details:
     """What else is worth keeping with the history, plain types only."""
     solver = analysis.solver
-    details: dict[str, Any] = {
-        "dofs": analysis.continuum.n_global,
-        "releases": sum(g.n_released for g in analysis.cracks),
-        "factorizations": solver.timings.factorizations,
-        "ranks": analysis.comm.size,
-        "seconds": dict(solver.timings.seconds),
-    }
+    details = Details(
+        {
+            "dofs": analysis.continuum.n_global,
+            "releases": sum(g.n_released for g in analysis.cracks),
+            "factorizations": solver.timings.factorizations,
+            "ranks": analysis.comm.size,
+            "seconds": dict(solver.timings.seconds),
+        }
+    )
     if isinstance(solver, ExplicitSolver):
-        return details | solver.about()
+        return Details(details | solver.about())
     system = analysis.condensed.system
-    details |= {"window": system.n_retained, "contact_steps": system.contact_steps}
+    details |= {"retained": system.n_retained, "contact_steps": system.contact_steps}
     if analysis.fatigue.table["N"]:
         details["tips"] = analysis.fatigue.table
     return details

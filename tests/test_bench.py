@@ -21,7 +21,7 @@ from fxcrack.bench.tables import show_explicit, show_speed
 
 COMM = MPI.COMM_WORLD
 KEYS = {
-    *("dofs", "window", "releases", "factorizations", "ranks", "seconds", "compile", "curve"),
+    *("dofs", "retained", "releases", "factorizations", "ranks", "seconds", "compile", "curve"),
     *("peak_memory_mb", "peak_memory_plain_mb", "ratio_to_one_solve"),
 }
 SECONDS = {"assemble", "plain_factor", "one_solve", "factor_with_schur", "growth", "total"}

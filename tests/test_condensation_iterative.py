@@ -238,7 +238,7 @@ def test_history_in_3d(comm: MPI.Intracomm, release: Any) -> None:
 @pytest.mark.slow
 @pytest.mark.mpi
 def test_columns_are_computed_once(comm: MPI.Intracomm) -> None:
-    """Small windows, each of which needs only what lies farther ahead."""
+    """Small sets, each of which needs only what lies farther ahead."""
     options = fx.CondensedOptions(method="iterative", rows=0.0)
     scene = dcb(comm, dx=1.0, ny=2, options=options)
     history = grow_to(scene, 40.0)
@@ -268,7 +268,7 @@ def test_old_columns_are_dropped_where_memory_is_short(
 
     monkeypatch.setattr("fxcrack.condensation.iterative.SchurColumns", Counted)
     monkeypatch.setattr("fxcrack.condensation.iterative._MANY", 1)
-    options = fx.CondensedOptions(method="iterative", rows=0.0, window_mb=0.03)
+    options = fx.CondensedOptions(method="iterative", rows=0.0, retained_mb=0.03)
     scene = dcb(comm, dx=1.0, ny=2, options=options)
     history = grow_to(scene, 40.0)
     assert len(made) >= 2
@@ -299,15 +299,15 @@ def test_options_are_checked() -> None:
     st.floats(1e-4, 10.0),
     st.lists(st.integers(1, 6), min_size=1, max_size=40),
 )
-def test_window_of_columns(column: float, window: float, steps: list[int]) -> None:
-    """Cheap windows are small, cheap columns make them reach far."""
+def test_reach_of_retained_columns(column: float, condensing: float, steps: list[int]) -> None:
+    """Cheap condensations reach little, cheap columns make them reach far."""
     counts = 10 + np.cumsum(steps)
-    n = ColumnCost(column, window).reach(counts)
+    n = ColumnCost(column, condensing).reach(counts)
     assert 1 <= n <= len(counts)
-    assert ColumnCost(column, 4.0 * window).reach(counts) >= n
-    assert ColumnCost(4.0 * column, window).reach(counts) <= n
-    assert ColumnCost(0.0, window).reach(counts) == len(counts)
-    assert ColumnCost(column, window).reach(counts[:0]) == 0
+    assert ColumnCost(column, 4.0 * condensing).reach(counts) >= n
+    assert ColumnCost(4.0 * column, condensing).reach(counts) <= n
+    assert ColumnCost(0.0, condensing).reach(counts) == len(counts)
+    assert ColumnCost(column, condensing).reach(counts[:0]) == 0
     cost = ColumnCost.guess(1000)
     cost.observe(10, 2.0, 2.5)
     assert (cost.column, cost.per_set) == (0.2, 0.5)

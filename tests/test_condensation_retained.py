@@ -1,4 +1,4 @@
-"""Which jumps take part in the condensation, and how far the window reaches."""
+"""Which jumps take part in the condensation, and how far the retained set reaches."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def test_expensive_entries_take_a_part(continuum: Continuum) -> None:
 
 
 def test_memory_cap(continuum: Continuum) -> None:
-    """Twice S in 8-byte numbers: 1.6 kB hold 10 components, which the smallest window needs."""
+    """Twice S in 8-byte numbers: 1.6 kB hold 10 components, which the smallest set needs."""
     _, found = roles(continuum, cap_mb=16 * 20**2 / 1e6)
     assert (found == RETAINED).sum() == 20
     _, found = roles(continuum, cap_mb=16 * 10**2 / 1e6)

@@ -1,6 +1,6 @@
 """Equilibrium of the interface with contact: optimality of what it finds, energy along the way.
 
-The structures are random: a full stiffness K over (inner, window, support) unknowns and force
+The structures are random: a full stiffness K over (inner, retained, support) unknowns and force
 patterns, condensed here by plain linear algebra. Conditions of optimality on K are sufficient for
 the (convex) contact problem, so checking them needs no second solver.
 """
@@ -28,7 +28,7 @@ ROUND_OFF = 1e-9  # condition numbers up to 1e4
 
 @dataclass
 class Structure:
-    """K over (inner, window, supports), force patterns f on the first two."""
+    """K over (inner, retained, supports), force patterns f on the first two."""
 
     k: Array
     f: Array
@@ -45,7 +45,7 @@ class Structure:
         return cls(k, f, n_retained)
 
     def system(self) -> ContactSystem:
-        """S over (window, supports, force patterns, one monitor: the first inner unknown)."""
+        """S over (retained, supports, force patterns, one monitor: the first inner unknown)."""
         n = len(self.k)
         monitor = np.zeros((n, 1))
         monitor[0] = 1.0
@@ -66,7 +66,7 @@ class Structure:
         return np.concatenate([inner, last])
 
     def interface_forces(self, state: Equilibrium) -> Array:
-        """K u - f on the window."""
+        """K u - f on the retained jumps."""
         u = self.displacement(state)
         residual = self.k @ u - self.f @ state.loads[N_SUPPORTS:]
         assert residual[:N_INNER] == pytest.approx(np.zeros(N_INNER), abs=ROUND_OFF)

@@ -34,17 +34,17 @@ def case(shape: str, dofs: float, method: str, **more: Any) -> dict[str, Any]:
     seconds = dict.fromkeys(("mesh", "scene", "assemble", "transform", "factor_inner"), 1e-6 * dofs)
     plane, ranks = shape == "plane", more.get("ranks", 1)
     factor = 1e-6 * dofs + (1e-9 * dofs**1.5 if plane else 1e-11 * dofs**2)
-    window = more.get("window", 100)
+    retained = more.get("retained", 100)
     share = 0.6 if ranks == 2 else 1.0
     direct = method == "schur"
-    seconds["factor_with_schur"] = (factor + 2e-7 * window**2) * share if direct else 0.0
+    seconds["factor_with_schur"] = (factor + 2e-7 * retained**2) * share if direct else 0.0
     seconds["multigrid"] = 0.0 if direct else 3e-5 * dofs
     seconds["columns"] = 0.0 if direct else 100 * 10 * 1e-7 * dofs * share
     memory = 600.0 * dofs * np.log2(dofs) if plane else 1000.0 * dofs + 200.0 * dofs ** (4 / 3)
-    memory = memory + 16.0 * window**2 if direct else 5000.0 * dofs + 4.0 * 100 * dofs
+    memory = memory + 16.0 * retained**2 if direct else 5000.0 * dofs + 4.0 * 100 * dofs
     return {
         "shape": shape, "dofs": dofs, "method": method, "ahead": False, "ranks": ranks,
-        "dim": 2 if plane else 3, "window": window, "columns": 0 if direct else 100,
+        "dim": 2 if plane else 3, "retained": retained, "columns": 0 if direct else 100,
         "iterations": 0.0 if direct else 10.0, "seconds": seconds, "memory_mb": memory / 1e6,
     } | more  # fmt: skip
 
@@ -53,7 +53,7 @@ def measured() -> dict[str, Any]:
     cases = [case("block", n, m) for n in (2e4, 6e4, 1e5) for m in ("schur", "iterative")]
     cases += [case("block", 6e4, m, ranks=2) for m in ("schur", "iterative")]
     cases += [case("plane", n, "schur") for n in (1e5, 4e5)]
-    cases += [case("plane", 1e5, "schur", ahead=True, window=1100)]
+    cases += [case("plane", 1e5, "schur", ahead=True, retained=1100)]
     cases += [{"shape": "plate", "dofs": 1e5, "method": "schur", "ranks": 1, "failed": "no"}]
     return {
         "date": "2000-01-01", "machine": "abacus", "cases": cases,
@@ -72,7 +72,7 @@ def known(tmp_path: Path) -> Constants:
 def test_laws_are_found_again(known: Constants) -> None:
     n = 3e4
     # the constants of `case`, up to the round-off of a least-squares problem
-    # whose window part is within 1e-3 of the factorisation
+    # whose part for the retained jumps is within 1e-3 of the factorisation
     assert known.laws["direct_seconds_3"](n) == pytest.approx(1e-6 * n + 1e-11 * n**2, rel=0.1)
     assert known.laws["direct_memory_3"](n) == pytest.approx(1000 * n + 200 * n ** (4 / 3))
     assert known.laws["direct_memory_2"](2e5) == pytest.approx(600 * 2e5 * np.log2(2e5))
@@ -118,8 +118,8 @@ def test_advice(known: Constants) -> None:
     small = advise(Task(2e4), bytes_per_rank=8e9, constants=known)
     assert [e.method for e in small] == ["direct", "iterative"]
     assert small[0].ranks == 1
-    # 200 n^(4/3) bytes are 2 TB at 3e7, the iteration takes (5000 + 4 window) n = 0.2 TB
-    large = advise(Task(3e7, window=300), bytes_per_rank=8e9, constants=known)
+    # 200 n^(4/3) bytes are 2 TB at 3e7, the iteration takes (5000 + 4 retained) n = 0.2 TB
+    large = advise(Task(3e7, retained=300), bytes_per_rank=8e9, constants=known)
     assert [(e.method, e.ranks) for e in large] == [("iterative", 32), ("direct", 256)]
     assert advise(Task(3e7), bytes_per_rank=8e9, ranks=1, constants=known) == []
     assert [e.method for e in advise(Task(1e5, dim=2), bytes_per_rank=8e9)] == ["direct"]

@@ -263,7 +263,7 @@ def test_watched_criteria_are_reported_and_decide_nothing() -> None:
     for scene in (alone, watched):
         run(scene, fx.Releases(4))
     times = [np.array(list(release_times(s).values())) for s in (alone, watched)]
-    assert times[1] == pytest.approx(times[0], rel=ROUND_OFF)  # the windows differ
+    assert times[1] == pytest.approx(times[0], rel=ROUND_OFF)  # the retained sets differ
     assert set(watched.history.columns) - set(alone.history.columns) == {"cod[bond]", "grown[bond]"}
     row = watched.history.at("released[bond]", 2)
     assert row["grown[bond]"] == pytest.approx(0.1)

@@ -353,7 +353,7 @@ def test_one_toughness_needs_no_law(mix: Any) -> None:
     assert criterion.critical([[0.1, 0.1, 0.04]], toughness) == pytest.approx([0.2])
 
 
-def test_windows() -> None:
+def test_release_ranges() -> None:
     assert VCCT(0.2).release_range == (1.0, 1.2)
     assert not VCCT(0.2).allows_normal_only
 

@@ -165,7 +165,7 @@ ROWS = [
     refused("amplitude that does not begin with 1"),
     refused("amplitude that begins late"),
     refused("amplitude that does not end with 0"),
-    Row("f above the window after all cutbacks", "stop", too_many_cutbacks,
+    Row("f above its range after all cutbacks", "stop", too_many_cutbacks,
         ("stopped: f = ", "after 2 cutbacks", "max_cutbacks")),
     Row("increment below the minimum", "stop", below_the_minimum,
         ("stopped: f = ", "below the minimum 0.4")),

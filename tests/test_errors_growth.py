@@ -1,4 +1,4 @@
-"""What growth refuses and warns of, and that the words say what, where and how to mend it."""
+"""What growth refuses and warns of, and that the words say what, where and how to correct it."""
 
 from __future__ import annotations
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
 from typing import Any
 
 import pytest
 from specimens import PINS, bond, grow_to
 
 import fxcrack as fx
+from fxcrack.history import Details
 from fxcrack.meshes.dcb import dcb_2d
 
 
@@ -62,7 +64,7 @@ def test_an_effect_adds_what_it_needs(name: str, capsys: pytest.CaptureFixture[s
         assert sum(found.costs.values()) > 0.0
     else:
         assert found.solver == "linear" and found.counts["factorisations"] == 1
-    # jumps that may touch or rub are unknowns of the window; other effects add none
+    # jumps that may touch or rub are retained; other effects add none
     extra = found.unknowns["retained jumps"] - plain.unknowns["retained jumps"]
     assert (extra > 0) == (name in ("contact", "friction"))
     assert ("contact nodes" in found.unknowns) == (name in ("contact", "friction"))
@@ -102,6 +104,20 @@ def test_the_former_name_of_the_solver_still_works() -> None:
             assert found.path == path
     with pytest.raises(fx.InputError, match="give solver alone"), pytest.warns(DeprecationWarning):
         scene(ELASTIC, path="newton", solver="newton")
+
+
+def test_the_former_name_of_the_retained_jumps_still_works() -> None:
+    with pytest.warns(DeprecationWarning, match="now called retained_mb"):
+        options = fx.CondensedOptions(window_mb=3.0)
+    assert options == fx.CondensedOptions("auto", 3.0)
+    assert dataclasses.replace(options, rows=1.0) == fx.CondensedOptions(retained_mb=3.0, rows=1.0)
+    with pytest.warns(DeprecationWarning, match="now called retained_mb"):
+        assert options.window_mb == 3.0
+    details = Details(retained=7)
+    with pytest.warns(DeprecationWarning, match=r"now called details\['retained'\]"):
+        assert details["window"] == 7
+    with pytest.raises(KeyError, match="dofs"):
+        details["dofs"]
 
 
 def test_plasticity_and_finite_strain_exclude_each_other() -> None:

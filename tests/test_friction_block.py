@@ -99,7 +99,7 @@ def test_a_turned_tangent_frame_turns_the_answer(seed: int, angle: float) -> Non
 
 
 def system_of(block: ContactBlock, seed: int) -> tuple[ContactSystem, Array]:
-    """A jump system with the block as its window, two supports, and a target for them."""
+    """A jump system with the jumps of the block retained, two supports, and a target for them."""
     rng = np.random.default_rng(seed)
     n = len(block.stiffness)
     m, d = len(block.mu), block.dim

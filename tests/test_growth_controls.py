@@ -27,7 +27,7 @@ RUNAWAY = {
 
 @pytest.mark.parametrize("name", RUNAWAY)
 def test_what_is_met_at_the_start_goes_in_the_smallest_increment(name: str) -> None:
-    # under a constant tension the crack runs away: f of every next tip is above its window at once
+    # under a constant tension the crack runs away: f of every next tip is above its range at once
     loads = [fx.Traction("top", (0.0, 1.0)), fx.Traction("bottom", (0.0, -1.0))]
     corners = [
         fx.Displacement("bottom_left", x=0.0, y=0.0), fx.Displacement("bottom_right", y=0.0)
@@ -65,7 +65,7 @@ def test_energy_release_rates_are_not_hurried_so() -> None:
 
 
 def test_neutral_growth_goes_on_in_small_increments() -> None:
-    """Pure moments: f is the same at every crack length, at last the upper end of its window."""
+    """Pure moments: f is the same at every crack length, at last the upper end of its range."""
 
     def moment(sign: float, y: float) -> tuple[Field, ...]:
         return (lambda x: sign * (x[1] - y), 0.0)

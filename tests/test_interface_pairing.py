@@ -60,7 +60,7 @@ def coordinates(
     interfaces: list[fx.Interface],
     supports: list[fx.Displacement] | tuple[fx.Displacement, ...] = (),
 ) -> tuple[list[Pair], JumpCoordinates, Array]:
-    """Pairs, their coordinates with all jumps in the window, and T dense."""
+    """Pairs, their coordinates with all jumps retained, and T dense."""
     model = fx.PlaneStrain() if mesh.gdim == 2 else fx.Solid()
     continuum = Continuum(mesh, STEEL, model)
     pairs = [make_pair(continuum, i) for i in interfaces]

@@ -45,12 +45,12 @@ def alive(comm: MPI.Intracomm, folder: Path) -> dict[str, int]:
 
 @pytest.mark.slow
 @pytest.mark.mpi
-def test_releases_and_new_windows_leave_nothing_behind(
+def test_releases_and_new_retained_sets_leave_nothing_behind(
     comm: MPI.Intracomm, shared_path: Path
 ) -> None:
-    """200 releases in tiny windows; fields asked for after each twenty of them.
+    """200 releases with tiny sets of retained jumps; fields asked for after each twenty of them.
 
-    Once the first window has been replaced, every later one must free what the one before made.
+    Once the first set has been replaced, every later one must free what the one before made.
     """
     PETSc.Log.begin()
     before = alive(comm, shared_path)

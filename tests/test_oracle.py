@@ -273,7 +273,7 @@ class Oracle:
         self.bond_force = forces[n:]
 
     def interface_forces(self) -> Array:
-        """What the model calls forces: on slaves, in their frames, per window component."""
+        """What the model calls forces: on slaves, in their frames, per retained component."""
         model = self.scene.solver
         out = np.zeros(model.system.n_retained)
         for (p, node, c), force in zip(self.bonds, self.bond_force, strict=True):
@@ -284,7 +284,7 @@ class Oracle:
         return out
 
     def jumps(self) -> Array:
-        """Jumps of the window components."""
+        """Jumps of the retained components."""
         model = self.scene.solver
         u = self.u.reshape(-1, self.gdim)
         out = np.zeros(model.system.n_retained)

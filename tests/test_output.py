@@ -108,7 +108,7 @@ def read_bodies(pvd: Path) -> list[tuple[float, list[dict[str, Any]]]]:
 @pytest.mark.quick("2d")
 @pytest.mark.mpi
 @pytest.mark.parametrize("kind", MESHES)
-def test_jumps_and_tractions_agree_with_the_window(kind: str) -> None:
+def test_jumps_and_tractions_agree_with_the_retained_ones(kind: str) -> None:
     scene = cracked(kind)
     model, pair = scene.solver, scene.pairs[0]
     (found,) = interface_fields(scene, displacement_function(scene))
@@ -122,7 +122,7 @@ def test_jumps_and_tractions_agree_with_the_window(kind: str) -> None:
     traction = model.vectors(0, nodes, force) / pair.surface.areas[:, None]
     largest = np.abs(found.traction).max()
     np.testing.assert_allclose(found.traction[inside], traction[inside], atol=ROUND_OFF * largest)
-    # outside the window as well: bonded nodes do not part, all bonds together carry the load
+    # outside the retained set as well: bonded nodes do not part, all bonds together carry the load
     bonded = found.state == 1
     assert np.abs(found.opening[bonded]).max() < ROUND_OFF * np.abs(found.opening).max()
     total = (found.traction * pair.surface.areas[:, None]).sum(axis=0)

@@ -10,7 +10,7 @@ import pytest
 from mpi4py import MPI
 
 import fxcrack as fx
-from fxcrack.base.together import meet
+from fxcrack.base.together import check_same_call
 from fxcrack.meshes.dcb import dcb_2d
 
 ROOT = Path(__file__).parent.parent
@@ -68,12 +68,12 @@ def test_arguments_that_differ_between_ranks_are_refused(comm: MPI.Comm) -> None
 @pytest.mark.three
 def test_different_functions_are_named(comm: MPI.Comm) -> None:
     if comm.size == 1:
-        meet(comm, "anything")
+        check_same_call(comm, "anything")
         return
     mine = "reading" if comm.rank == 0 else "writing"
     with pytest.raises(fx.FxcrackError, match=r"different tasks.*rank 0 reading, rank 1 writing"):
-        meet(comm, mine)
-    meet(comm, "both", {"number": 3})
+        check_same_call(comm, mine)
+    check_same_call(comm, "both", {"number": 3})
 
 
 # -- programs whose ranks part ---------------------------------------------------------------------
@@ -85,7 +85,7 @@ import fxcrack as fx
 from fxcrack.base import together
 rank = MPI.COMM_WORLD.rank
 def work():
-    together.meet(MPI.COMM_WORLD, "work")
+    together.check_same_call(MPI.COMM_WORLD, "work")
 """
 
 

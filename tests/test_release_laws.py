@@ -108,7 +108,7 @@ def test_rebases_while_bonds_soften_change_nothing(comm):
         factorizations = scene.solver.timings.factorizations
         solves.append(scene.solver.soft_counts.solves)
         scene.close()
-    assert factorizations > 2  # the short window did make it factor again
+    assert factorizations > 2  # the short reach did make it factor again
     assert solves[1] >= solves[0] > 0  # counted through all of them
     one, other = histories
     assert len(one) == len(other)

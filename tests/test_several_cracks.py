@@ -134,7 +134,7 @@ def test_order_of_steps_does_not_matter_where_nothing_grows() -> None:
     for g, h in zip(at_once.cracks, in_parts.cracks, strict=True):
         assert [n for n, _ in g.released] == [n for n, _ in h.released]
         times = [np.array([t for _, t in growth.released]) for growth in (g, h)]
-        assert times[1] == pytest.approx(times[0], rel=1e-8)  # other windows, another factor
+        assert times[1] == pytest.approx(times[0], rel=1e-8)  # other retained sets, another factor
 
 
 @pytest.mark.slow
@@ -203,7 +203,7 @@ def test_force_follows_the_amplitude_through_steps() -> None:
 @pytest.mark.slow
 @pytest.mark.mpi
 @pytest.mark.parametrize("rows", [None, 0.1])
-def test_release_in_progress_survives_steps_and_new_windows(rows: float | None) -> None:
+def test_release_in_progress_survives_steps_and_new_retained_sets(rows: float | None) -> None:
     criterion = fx.CriticalStress(100.0, distance=0.1)
     whole = plate(criterion, release=LAW, n_crack=20)
     parts = plate(criterion, release=LAW, n_crack=20, options=fx.CondensedOptions(rows=rows))
@@ -214,7 +214,7 @@ def test_release_in_progress_survives_steps_and_new_windows(rows: float | None) 
     assert len(times[0]) > 30
     assert times[1] == pytest.approx(times[0], rel=ROUND_OFF)
     assert_balanced(history)
-    # one per step; with a small window more while bonds behind the front still carry forces
+    # one per step; with a small set more while bonds behind the front still carry forces
     assert (history.details["factorizations"] > 4) == (rows is not None)
 
 
@@ -230,13 +230,13 @@ def test_first_increment_after_debonding() -> None:
         for a, b in pairwise(rows)
         if a["event"] == "release" and b["event"] == "increment"
     ]
-    # the smallest one where the next tip is in its window from the start
+    # the smallest one where the next tip is in its retained set from the start
     for size, met in after:
         assert size == pytest.approx(1e-9 if met else 2e-5, rel=1e-6)
     assert {met for _, met in after} == {True, False}
     assert_balanced(history)
     for a, b in pairwise(rows):
-        if b["event"] == "release":  # nodes went inside the window of these criteria
+        if b["event"] == "release":  # nodes went inside the retained set of these criteria
             assert 0.9 <= a["f[bond]"] <= 1.1 + 1e-12
 
 

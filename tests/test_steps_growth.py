@@ -35,7 +35,7 @@ from fxcrack.meshes.penny import penny
 
 Array = npt.NDArray[np.float64]
 
-SAME = 1e-8  # of the largest value: what other ranks, windows or programs may differ by
+SAME = 1e-8  # of the largest value: what other ranks, retained sets or programs may differ by
 BALANCE = 1e-9  # of the work: round-off of the condensation
 CARBON = fx.Orthotropic(
     E=(139.4e3, 10.16e3, 10.16e3), nu=(0.30, 0.30, 0.436), G=(4.6e3, 4.6e3, 3.54e3)
@@ -108,7 +108,7 @@ def test_held_sideways_a_solid_is_in_plane_strain(cell: str) -> None:
     assert histories[1].details["releases"] == 4 * histories[0].details["releases"]
 
 
-# -- ranks, windows and stepping -------------------------------------------------------------------
+# -- ranks, retained sets and stepping ------------------------------------------------------------
 
 
 def contact_specimen(comm: MPI.Intracomm, **options: object) -> fx.Scene:
@@ -212,8 +212,8 @@ def test_any_number_of_ranks(comm: MPI.Intracomm, name: str) -> None:
 @pytest.mark.quick("options0-DCB", "options1-contact", "options1-increments")
 @pytest.mark.parametrize("name", RUNS)
 @pytest.mark.parametrize("options", [{"rows": 0.0}, {"method": "columns"}])
-def test_any_window(name: str, options: dict[str, object]) -> None:
-    """Small windows that force new factorisations, and S by columns: the same history."""
+def test_any_retained_set(name: str, options: dict[str, object]) -> None:
+    """Small retained sets that force new factorisations, and S by columns: the same history."""
     make, step = RUNS[name]
     whole = make(MPI.COMM_SELF)
     small = make(MPI.COMM_SELF, options=fx.CondensedOptions(**options))
@@ -221,14 +221,14 @@ def test_any_window(name: str, options: dict[str, object]) -> None:
     if "rows" in options:
         assert small.solver.rebases >= 1
         assert found.details["factorizations"] == small.solver.rebases + 1
-        assert found.details["window"] <= expected.details["window"]
+        assert found.details["retained"] <= expected.details["retained"]
     assert_same(expected, found, SAME)
     assert largest_imbalance(found) < BALANCE
 
 
 @pytest.mark.mpi
-def test_new_windows_on_several_ranks(comm: MPI.Intracomm) -> None:
-    """The front leaves the window again and again; fields come back after each factorisation."""
+def test_new_retained_sets_on_several_ranks(comm: MPI.Intracomm) -> None:
+    """The front leaves the retained set repeatedly; fields come back after each factorisation."""
     small = fx.CondensedOptions(rows=0.0)
     alone = dcb(MPI.COMM_SELF, dx=1.0, ny=2, contact=True)
     together = dcb(comm, dx=1.0, ny=2, contact=True, options=small)
@@ -249,7 +249,7 @@ def test_new_windows_on_several_ranks(comm: MPI.Intracomm) -> None:
 
 
 def test_two_steps_are_one() -> None:
-    """A second step takes over where the first one ended, in a window of its own."""
+    """A second step takes over where the first one ended, with a retained set of its own."""
     one, two = dcb(MPI.COMM_SELF, dx=1.0, ny=2), dcb(MPI.COMM_SELF, dx=1.0, ny=2)
     grow_to(one, 45.0)
     grow_to(two, 38.0)

@@ -110,9 +110,9 @@ def test_path_needs_one_proportional_load() -> None:
         scene.run(fx.Static(until=fx.Releases(1), stepping="path"))
 
 
-def test_window_that_exceeds_its_cap() -> None:
-    scene = dcb(MPI.COMM_SELF, dx=2.0, ny=1, options=fx.CondensedOptions(window_mb=1e-4))
-    with pytest.raises(InputError, match=r"exceed the cap of 0 MB; raise window_mb, or coarsen"):
+def test_retained_set_that_exceeds_its_cap() -> None:
+    scene = dcb(MPI.COMM_SELF, dx=2.0, ny=1, options=fx.CondensedOptions(retained_mb=1e-4))
+    with pytest.raises(InputError, match=r"exceed the cap of 0 MB; raise retained_mb, or coarsen"):
         scene.run(fx.Static(until=fx.Releases(1)))
 
 

@@ -145,7 +145,10 @@ CALLS: list[Call] = [
         },
     ),
     (fx.EnhancedVCCT, {"GIc": 0.2, "GIc_p": 0.3}),
-    (fx.Fatigue, {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False}),
+    (
+        fx.Fatigue,
+        {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False, "partial": True},
+    ),
     (
         fx.Paris,
         {
@@ -210,7 +213,7 @@ CALLS: list[Call] = [
     ),
     (fx.Cycles, {"period": (0.0, 1.0), "n_max": 10.0}),
     (fx.NewtonOptions, {"tolerance": 1e-10, "max_iterations": 25, "reuse": True, "balance": 1e-5}),
-    (fx.CondensedOptions, {"method": "auto", "window_mb": 10.0, "rows": 1.0, "rtol": 1e-6}),
+    (fx.CondensedOptions, {"method": "auto", "retained_mb": 10.0, "rows": 1.0, "rtol": 1e-6}),
     (fx.Checkpoint, {"path": "a.npz", "every": 3, "seconds": 1.0}),
     (fx.Split, {"surface": "s", "slave": "a", "master": "b", "toward": (0.0, 1.0)}),
 ]  # fmt: skip

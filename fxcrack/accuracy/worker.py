@@ -107,7 +107,7 @@ def run_once(study: Study, setting: Setting, comm: MPI.Intracomm, *, memory: boo
             "source": theory.source, "exact": theory.exact, "values": theory.measured.values(),
         },
         "dofs": int(details["dofs"]),
-        "window": int(details["window"]),
+        "retained": int(details["retained"]),
         "releases": int(details["releases"]),
         "factorizations": int(details["factorizations"]),
         "seconds": slowest(comm, total),

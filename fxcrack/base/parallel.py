@@ -95,7 +95,7 @@ def all_or_none(
     Raises:
         FxcrackError: The block raised on some rank; its own exception is the cause there.
     """
-    together.meet(comm, task)
+    together.check_same_call(comm, task)
     cause: Exception | None = None
     try:
         yield

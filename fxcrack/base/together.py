@@ -1,4 +1,4 @@
-"""Whether all ranks are where one of them is: collective functions meet before they begin.
+"""Whether all ranks are where one of them is: collective functions compare their calls first.
 
 Left alone, a rank that calls a collective function which another rank does not call waits for ever.
 Here every rank says what it is about to do, and with which arguments, in one message that all of
@@ -40,7 +40,7 @@ _HAND_ON = 0.5
 
 
 class _Ranks:
-    """The communicator on which ranks meet, and what is known of those that have left.
+    """The communicator on which calls are compared, and what is known of those that have left.
 
     It is a duplicate of the world, so that nothing here mixes with the messages of a program, and
     it is made without waiting, as not all ranks may import this package at the same time.
@@ -75,7 +75,7 @@ class _Ranks:
             self.comm.Recv(code, source=status.source, tag=_LEFT)
             self.left[status.source] = int(code[0])
 
-    def say_farewell(self, code: int) -> None:
+    def announce_exit(self, code: int) -> None:
         """Tell all others that this rank leaves; does not wait."""
         assert self.comm is not None
         number = np.array([code], dtype=np.int64)
@@ -90,7 +90,7 @@ _ranks = _Ranks()
 _ordinary_exit = sys.exit
 
 
-def meet(comm: MPI.Comm, task: str, given: Mapping[str, Any] | None = None) -> None:
+def check_same_call(comm: MPI.Comm, task: str, given: Mapping[str, Any] | None = None) -> None:
     """All ranks begin the same task with the same arguments; collective.
 
     Args:
@@ -223,7 +223,7 @@ def _described(value: Any, depth: int = 0) -> Any:
 
 
 @contextmanager
-def inside() -> Iterator[None]:
+def in_collective_call() -> Iterator[None]:
     """Note that a collective function is at work: who leaves in the middle of it ends the job."""
     try:
         yield
@@ -283,7 +283,7 @@ def _leave() -> None:
     deadline = time.monotonic() + PATIENCE
     if _ranks.ready():
         assert _ranks.comm is not None
-        _ranks.say_farewell(code)
+        _ranks.announce_exit(code)
         while code and len(_ranks.left) < _ranks.comm.size - 1 and time.monotonic() < deadline:
             _ranks.listen()
             time.sleep(0.01)

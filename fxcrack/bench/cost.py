@@ -23,7 +23,7 @@ METHODS = ("direct", "iterative")
 
 _BLOCK = 32  # columns solved together
 _S_BYTES = 16.0  # S and its growing factor, per entry
-_S_MOST = 2e9  # bytes of them, the default of CondensedOptions.window_mb
+_S_MOST = 2e9  # bytes of them, the default of CondensedOptions.retained_mb
 _REDUCTIONS, _EXCHANGES = 3, 7  # per iteration; the latter per level
 _MOST_RANKS = 65536
 
@@ -35,7 +35,7 @@ class Task:
     Attributes:
         dofs: Displacement dofs.
         dim: 2 or 3.
-        window: Number of retained jumps, components that open or are watched.
+        retained: Number of retained jumps, components that open or are watched.
         releases: Events.
         shape: "block" (compact) or "plate" (slender arms), which decides the iterations.
 
@@ -45,7 +45,7 @@ class Task:
 
     dofs: float
     dim: int = 3
-    window: float = 2000.0
+    retained: float = 2000.0
     releases: float = 500.0
     shape: str = "block"
 
@@ -54,7 +54,7 @@ class Task:
             raise InputError(f"dim = {self.dim}: choose 2 or 3")
         if self.shape not in ("block", "plate"):
             raise InputError(f"shape = '{self.shape}': choose block or plate")
-        for name in ("dofs", "window", "releases"):
+        for name in ("dofs", "retained", "releases"):
             value = getattr(self, name)
             if not 1.0 <= value <= 1e13:
                 raise InputError(f"{name} = {value}: choose a number of at least 1")
@@ -110,7 +110,7 @@ def estimate(
     if method == "iterative" and task.dim == 2:
         raise InputError("the iterative method is not modelled in 2-D: the direct one always wins")
     c = shipped() if constants is None else constants
-    n, w, d = task.dofs, task.window, str(task.dim)
+    n, w, d = task.dofs, task.retained, str(task.dim)
     share = float(ranks ** -c.gain[f"{method}_{d}"])
     base = c.laws[f"base_seconds_{d}"]
     seconds = {"mesh, assembly, T": base(n) / ranks}

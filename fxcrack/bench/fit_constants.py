@@ -52,7 +52,7 @@ def fit_constants(result: Result) -> Result:
         n = [c["dofs"] for c in mine]
         factor = [c["seconds"]["factor_with_schur"] for c in mine]
         laws[f"direct_seconds_{d}"] = fit_law(n, factor, exponent, 0.0, True)
-        size = [1e6 * c["memory_mb"] - 16.0 * c["window"] ** 2 for c in mine]
+        size = [1e6 * c["memory_mb"] - 16.0 * c["retained"] ** 2 for c in mine]
         laws[f"direct_memory_{d}"] = fit_law(n, size, *memory)
         laws[f"base_seconds_{d}"] = fit_law(n, [_base(c) for c in mine], 1.0, 0.0, True)
         gain[f"direct_{d}"] = _gain(cases, d, "schur", "factor_with_schur")
@@ -99,7 +99,7 @@ def _per_entry(cases: list[Result], shape: str) -> float:
     for big in (c for c in of if c["ahead"]):
         for small in (c for c in of if not c["ahead"] and c["dofs"] == big["dofs"]):
             more = [c["seconds"]["factor_with_schur"] for c in (small, big)]
-            entries = big["window"] ** 2 - small["window"] ** 2
+            entries = big["retained"] ** 2 - small["retained"] ** 2
             found.append(max(more[1] - more[0], 0.0) / entries)
     return max(found, default=5e-8 if shape == "plane" else 2.5e-7)
 

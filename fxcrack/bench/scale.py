@@ -166,7 +166,7 @@ def measure(case: ScaleCase, comm: MPI.Intracomm) -> Result:
         **asdict(case),
         "dim": case.dim,
         "dofs": scene.continuum.n_global,
-        "window": system.n_retained,
+        "retained": system.n_retained,
         "releases": sum(g.n_released for g in scene.cracks),
         "seconds": {k: slowest(comm, v) for k, v in seconds.items()},
         "columns": len(space.known) if space is not None else 0,

@@ -74,7 +74,7 @@ def run(
         **({"dy": problem.dy} if problem.is_3d else {}),
         "ny": problem.ny,
         "dofs": history.details["dofs"],
-        "window": history.details["window"],
+        "retained": history.details["retained"],
         "releases": int(history.rows[growth.last]["released[bond]"]),
         "events": len(_onsets(growth)),
         "factorizations": history.details["factorizations"],

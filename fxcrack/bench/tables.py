@@ -51,7 +51,7 @@ def _summary(result: Result) -> Table:
     size = ", ".join(f"{k} {result[k]:g}" for k in ("dx", "dy", "ny") if k in result)
     table = new_table(f"{result['problem']} ({size})", "", "")
     table.show_header = False
-    for key in ("dofs", "window", "releases", "events", "factorizations", "ranks", "threads"):
+    for key in ("dofs", "retained", "releases", "events", "factorizations", "ranks", "threads"):
         table.add_row(key, str(result[key]))
     table.add_row("total / one static solve", f"{result['ratio_to_one_solve']:.2f}")
     same = result["ratio_to_one_solve_same_order"]
@@ -114,7 +114,7 @@ def show_scale(result: Result, console: Console) -> None:
     """Print a result of :func:`fxcrack.bench.scale.run`."""
     table = new_table(
         f"direct and iterative, {result['date']}, {result['machine']}",
-        *("shape", "dofs", "method", "ranks", "window", "condense s", "per column ms"),
+        *("shape", "dofs", "method", "ranks", "retained", "condense s", "per column ms"),
         *("iterations", "total s", "memory MB", "kB/dof"),
     )
     for c in result["cases"]:
@@ -126,7 +126,7 @@ def show_scale(result: Result, console: Console) -> None:
         condense = sum(s[k] for k in ("transform", "factor_with_schur", "multigrid", "columns"))
         column = f"{1e3 * s['columns'] / c['columns']:.1f}" if c["columns"] else ""
         table.add_row(
-            *start, str(c["window"]), f"{condense:.2f}", column,
+            *start, str(c["retained"]), f"{condense:.2f}", column,
             f"{c['iterations']:.0f}" if c["columns"] else "", f"{s['total']:.2f}",
             f"{c['memory_mb']:.0f}", f"{1e-3 * c['bytes_per_dof']:.1f}",
         )  # fmt: skip
@@ -175,7 +175,7 @@ def show_cost(
     console.print(f"constants measured {constants.date} on {constants.machine}")
     console.print("* extrapolated: outside the sizes or ranks measured")
     for task, estimates in found:
-        title = f"{task.dofs:.3g} dofs, {task.dim}-D, window {task.window:g}, "
+        title = f"{task.dofs:.3g} dofs, {task.dim}-D, {task.retained:g} retained jumps, "
         title += f"{task.releases:g} releases"
         if not estimates:
             console.print(

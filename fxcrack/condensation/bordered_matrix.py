@@ -38,7 +38,7 @@ def load_and_monitor_vectors(
     for load in loads:
         vector = load_vector(continuum, load)
         good = np.all(np.isfinite(vector.array_r))
-        bad = f"load '{load.title}' is not a finite number everywhere; mend its value"
+        bad = f"load '{load.title}' is not a finite number everywhere; correct its value"
         raise_on_all_ranks(continuum.comm, None if good else bad)
         vector.scale(-1.0)
         out.append(vector)

@@ -199,7 +199,7 @@ def choose_roles(
     if n_fixed > most:
         raise InputError(
             f"at least {n_fixed} jump components must be retained, whose dense matrices exceed "
-            f"the cap of {cap_mb:.0f} MB; raise window_mb, or coarsen the interface"
+            f"the cap of {cap_mb:.0f} MB; raise retained_mb, or coarsen the interface"
         )
     fits = counts[counts <= most]
     for _, p, i in waiting[: min(cost.reach(counts), len(fits))]:

@@ -38,7 +38,7 @@ def starting_velocity(continuum: Continuum, velocity: Sequence[Any] | None) -> A
 
 
 def _positions_within(continuum: Continuum) -> Array:
-    """Positions of the owned nodes, by a trifle inside their own body, shape (n, 3).
+    """Positions of the owned nodes, slightly inside their own body, shape (n, 3).
 
     The two nodes at one place of an interface belong to bodies that may move differently.
     """

@@ -133,7 +133,7 @@ def interpolate_given(
         if len(bad):
             problem = (
                 f"{owner} is not a finite number everywhere: {name} gives {numbers[bad[0]]} at "
-                f"{format_point(x[:, bad[0]])}; mend its value"
+                f"{format_point(x[:, bad[0]])}; correct its value"
             )
             numbers = np.where(np.isfinite(numbers), numbers, 0.0)
         numbers = numbers - less

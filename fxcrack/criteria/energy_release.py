@@ -24,6 +24,7 @@ from fxcrack.criteria.crack_closure import (
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
+from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.criteria.mixed_mode import BK, MixedMode, law_of, total
 from fxcrack.criteria.probe import (
     FrontProbe,
@@ -242,6 +243,7 @@ class RateEvaluator(SofteningEvaluator):
     """
 
     toughness: Array
+    ligaments: Ligaments | None = None
 
     def __init__(
         self,
@@ -296,6 +298,9 @@ class RateEvaluator(SofteningEvaluator):
                 # on a ring the midside force belongs to its own circumference
                 breadth = self.probe.front.surface.breadth
                 force[:, 1] *= (breadth[tips.node] / breadth[tips.force_nodes[:, 1]])[:, None]
+        if self.ligaments is not None:
+            normalisation = self.criterion.normalisation
+            self.ligaments.put(self.probe, tips, state, normalisation, force, opening)
         columns = [force.reshape(len(tips), -1), opening.reshape(len(tips), -1)]
         if self._moving and self._temperature is not None:
             columns.append(self._temperature(time)[tips.node, None])

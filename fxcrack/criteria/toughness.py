@@ -151,7 +151,7 @@ def _check_values(owner: str, name: str, values: Array, nodes: npt.NDArray[np.in
     if bad.size:
         raise InputError(
             f"{owner}: {name} = {values[bad[0]]} at slave node {nodes[bad[0]]}; it must be "
-            f"positive and finite everywhere, but is not at {_listed(nodes[bad])}; mend it there"
+            f"positive and finite everywhere, but is not at {_listed(nodes[bad])}; correct it there"
         )
 
 

@@ -274,8 +274,8 @@ class Contacts:
     def _interface(self, pair: PairDef, interactions: dict[str, Family]) -> Interface:
         card, flat, groups = pair.row.card, self._flat, self._groups
         index = pair.row.index
-        slave = groups.facets(pair.slave, flat.surface(card, pair.slave, index))
-        master = groups.facets(pair.master, flat.surface(card, pair.master, index))
+        slave = groups.surface(card, pair.slave, index)
+        master = groups.surface(card, pair.master, index)
         bonded: object = Everywhere(card.has("TIED"))
         if pair.bonded is not None:
             name = label(pair.bonded.text(2))
@@ -366,15 +366,15 @@ class Contacts:
             criterion_card.fail(str(error))
 
     def _tie(self, row: Row) -> Interface:
-        card, flat, groups = row.card, self._flat, self._groups
+        card, groups = row.card, self._groups
         slave, master = label(row.text(0)), label(row.text(1))
         if not slave or not master or key(slave) == key(master):
             row.fail("a tie needs two surfaces, slave and master")
         card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "SURFACE TO SURFACE")
         tolerance = card.number("POSITION TOLERANCE", 0.0) or None
         return Interface(
-            groups.facets(slave, flat.surface(card, slave, row.index)),
-            groups.facets(master, flat.surface(card, master, row.index)),
+            groups.surface(card, slave, row.index),
+            groups.surface(card, master, row.index),
             bonded=Everywhere(True),
             tolerance=tolerance,
             name=card.text("NAME", default=slave),

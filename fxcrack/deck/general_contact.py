@@ -230,8 +230,7 @@ class GeneralContact:
     ) -> Interface:
         flat, card = self._flat, pair.row.card
         facets = [
-            self._groups.facets(name, flat.surface(card, name, pair.row.index))
-            for name in (pair.slave, pair.master)
+            self._groups.surface(card, name, pair.row.index) for name in (pair.slave, pair.master)
         ]
         bonded: object = Everywhere(False)
         tolerance = None

@@ -289,13 +289,15 @@ def _arrays_of_bonds(bonds: list[CohesiveBond], finished: float) -> Arrays:
         "soft.strength": np.array([b.strength for b in bonds], dtype=float),
         "soft.final": np.array([b.final for b in bonds], dtype=float),
         "soft.largest": np.array([np.nan if b.largest is None else b.largest for b in bonds]),
+        "soft.fixed": np.array([b.fixed for b in bonds], dtype=bool),
         "soft.finished": np.array(finished),
     }
 
 
 def _bonds_of_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> list[CohesiveBond]:
-    law = (arrays[f"soft.{name}"].astype(float) for name in ("strength", "final", "largest"))
+    law = tuple(arrays[f"soft.{name}"].astype(float) for name in ("strength", "final", "largest"))
     rows, direction = arrays["soft.where"].astype(np.int64), arrays["soft.direction"].astype(float)
+    fixed = arrays.get("soft.fixed", np.zeros(len(law[0]), dtype=bool)).astype(bool)
     bonds = []
     for i, (strength, final, largest) in enumerate(zip(*law, strict=True)):
         mine = rows[:, 0] == i
@@ -304,6 +306,7 @@ def _bonds_of_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> list[CohesiveBon
             CohesiveBond(
                 np.full(len(nodes), -1), direction[mine], float(strength), float(final),
                 (int(pair[0]), nodes, local), None if np.isnan(largest) else float(largest),
+                bool(fixed[i]),
             )
         )  # fmt: skip
     return bonds

@@ -75,7 +75,7 @@ def snap_through(
         if whole and x == 1.0:
             return opens, np.maximum(largest, w), step
     raise ComesApart(
-        f"softening bonds: no equilibrium after {step} steps downhill with {len(w)} bonds; "
+        f"softening bonds: no equilibrium after {step} steps of descent with {len(w)} bonds; "
         "the load exceeds what the interface can carry"
     )
 

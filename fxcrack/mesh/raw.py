@@ -168,7 +168,7 @@ def check_shapes(raw: RawMesh) -> None:
         centre = raw.points[raw.cells[found[0]]].mean(axis=0)
         raise MeshError(
             f"{len(found)} of {len(raw.cells)} cells are degenerate (no volume, or folded over), "
-            f"the first at {format_point(centre)}; mend the geometry there or change the "
+            f"the first at {format_point(centre)}; correct the geometry there or change the "
             "element size"
         )
 

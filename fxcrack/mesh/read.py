@@ -14,7 +14,7 @@ from mpi4py import MPI
 
 from fxcrack.base.checks import check_list
 from fxcrack.base.errors import MeshError
-from fxcrack.base.together import meet
+from fxcrack.base.together import check_same_call
 from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.extract import extract
 from fxcrack.mesh.mesh import Mesh
@@ -50,7 +50,7 @@ def read_mesh(
     """
     path = Path(path)
     split = check_list("read_mesh", "split", split, Split)
-    meet(comm, f"read_mesh('{path.name}')", {"path": path, "gdim": gdim, "split": split})
+    check_same_call(comm, f"read_mesh('{path.name}')", {"path": path, "gdim": gdim, "split": split})
 
     def work() -> RawMesh:
         if path.suffix.lower() not in _READABLE:
@@ -97,7 +97,7 @@ def mesh_from_gmsh(
             dimensions, a group without elements or off the cells, a surface that cannot be split.
     """
     split = check_list("mesh_from_gmsh", "split", split, Split)
-    meet(comm, f"mesh_from_gmsh('{name}')", {"name": name, "gdim": gdim, "split": split})
+    check_same_call(comm, f"mesh_from_gmsh('{name}')", {"name": name, "gdim": gdim, "split": split})
 
     def work() -> RawMesh:
         if model is None:

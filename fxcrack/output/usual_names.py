@@ -23,7 +23,7 @@ import re
 
 from fxcrack.base.checks import check_instance
 from fxcrack.base.errors import InputError
-from fxcrack.history import History, Row
+from fxcrack.history import Details, History, Row
 
 _WHOLE = {
     "strain_energy": "ALLSE",
@@ -64,7 +64,7 @@ def with_usual_names(history: History) -> History:
     if len(set(names.values())) < len(names):
         raise InputError("two columns of the history would have the same usual name")
     out = History(history.comm)
-    out.reason, out.details = history.reason, dict(history.details)
+    out.reason, out.details = history.reason, Details(history.details)
     failed: dict[str, float] = {}
     released: dict[str, float] = {}
     for row in history.rows:

@@ -139,7 +139,7 @@ class RestartManager:
         if found:
             raise InputError(
                 f"checkpoint {path} belongs to another scene: {summary(found)}. Run without "
-                "restart, or mend the scene"
+                "restart, or correct the scene"
             )
         with _refused(path):
             apply_before_condensation(self._analysis, saved)

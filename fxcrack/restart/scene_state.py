@@ -15,6 +15,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
+from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.restart.checkpoint import Arrays, Saved
 from fxcrack.restart.growing import Cell, GrowingArray, RowTable, rows_of
 from fxcrack.solvers.base import Solver
@@ -58,6 +59,8 @@ def collect(analysis: Analysis, packed: Packed) -> Saved:
     for p in fatigue.waiting:
         arrays[f"fatigue.waiting[{p}]"] = fatigue.waiting[p]
         arrays[f"fatigue.credit[{p}]"] = fatigue.credit[p]
+        arrays[f"fatigue.part[{p}]"] = fatigue.ligaments[p].part
+        arrays[f"fatigue.stiffness[{p}]"] = fatigue.ligaments[p].stiffness
     about = {
         "balance": analysis.balance.asdict(),
         "ramps": [_ramp(r) for r in analysis.ramps],
@@ -91,6 +94,11 @@ def apply_before_condensation(analysis: Analysis, saved: Saved) -> None:
     for p in known["pairs"]:
         fatigue.waiting[p] = np.asarray(arrays[f"fatigue.waiting[{p}]"], dtype=bool)
         fatigue.credit[p] = np.asarray(arrays[f"fatigue.credit[{p}]"], dtype=float)
+        fatigue.ligaments[p] = Ligaments.none(len(fatigue.credit[p]))
+        for name in ("part", "stiffness"):
+            if f"fatigue.{name}[{p}]" in arrays:  # not in files of versions without partial growth
+                given = np.array(arrays[f"fatigue.{name}[{p}]"], dtype=float)
+                setattr(fatigue.ligaments[p], name, given)
 
 
 def apply_after_condensation(analysis: Analysis, saved: Saved) -> None:
@@ -103,7 +111,7 @@ def apply_after_condensation(analysis: Analysis, saved: Saved) -> None:
     if not np.allclose(before, now, rtol=_SAME, atol=_SAME * np.abs(before).max(initial=0.0)):
         raise InputError(
             f"the checkpoint does not fit: at time {analysis.time:g} amplitudes and load factors "
-            f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or mend the "
+            f"were {before.tolist()}, they are {now.tolist()}. Run without restart, or correct the "
             "scene"
         )
     _check_jumps(analysis, saved.arrays)
@@ -206,7 +214,7 @@ def _check_jumps(analysis: Analysis, arrays: Arrays) -> None:
         raise InputError(
             f"the checkpoint does not fit: jumps differ by {off / size:.1e} of the largest one "
             "from the equilibrium of this scene; bodies or loads are others than when it was "
-            "written (a function of position, perhaps). Run without restart, or mend the scene"
+            "written (a function of position, perhaps). Run without restart, or correct the scene"
         )
 
 

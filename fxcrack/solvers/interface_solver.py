@@ -275,7 +275,7 @@ class InterfaceSolver(ABC):
             self._cost,
             around=self.around,
             keep=state.nodes_to_retain(self.pairs),
-            cap_mb=self.options.window_mb,
+            cap_mb=self.options.retained_mb,
             gdim=self.continuum.gdim,
         )
 
@@ -381,7 +381,7 @@ class InterfaceSolver(ABC):
         for bond in self.system.soft.bonds:
             pair, members, _ = bond.where
             if pair == p:
-                left = bond.force(bond.opening(self.state.jump)) / bond.strength
+                left = bond.remaining(bond.opening(self.state.jump))
                 nodes.append(members)
                 fractions.append(np.full(len(members), left))
         return np.concatenate(nodes), np.concatenate(fractions)

@@ -81,7 +81,7 @@ class LinearSolver(InterfaceSolver):
         if options.method == "iterative" or (options.method == "auto" and self._too_large()):
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(
-                continuum, pairs, supports, rtol=options.rtol, cap_mb=options.window_mb
+                continuum, pairs, supports, rtol=options.rtol, cap_mb=options.retained_mb
             )
         self._n_thermal = sum(isinstance(x, ThermalLoad) for x in loads)
         self._held_energies: Array | None = None

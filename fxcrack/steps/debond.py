@@ -63,7 +63,7 @@ class Debond:
         self.__dict__.update({"release": _BY_DEFAULT} | state)
 
     def __post_init__(self) -> None:
-        """Refuse what no model could mend."""
+        """Refuse what no model could make right."""
         example = "Interface('upper_face', 'lower_face', bonded=...)"
         check_instance("Debond", "interface", self.interface, Interface, example)
         where = f"interface '{self.interface.title}'"

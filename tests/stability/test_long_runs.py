@@ -92,7 +92,7 @@ def test_ten_thousand_increments(
     assert objects[0]["Matrix"] > 0  # the table was read
     assert all(later == objects[0] for later in objects[1:])
     # steps of the allocator are some tenths of a MB; a forgotten equilibrium per increment would be
-    # 1 kB for this window, 8 MB in all
+    # 1 kB for this set, 8 MB in all
     assert memory[-1] - memory[1] < 2.0
     scene.close()
 

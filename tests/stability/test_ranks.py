@@ -125,4 +125,4 @@ def test_same_refusal_on_every_rank(comm: MPI.Intracomm) -> None:
     every = comm.allgather(words)
     assert every == [every[0]] * comm.size
     (message,) = every[0]
-    assert message.startswith("load 'top'") and message.endswith("; mend its value")
+    assert message.startswith("load 'top'") and message.endswith("; correct its value")
