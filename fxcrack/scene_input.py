@@ -171,7 +171,7 @@ def compose(given: SceneInput) -> Analysis:
         temperature=temperature_of(given.effects),
     )
     pairs = [make_pair(continuum, i) for i in given.interfaces]
-    check_friction(given.debonds, pairs)
+    check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     supports = collect_supports(continuum, list(given.supports))
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver)
