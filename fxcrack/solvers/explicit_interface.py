@@ -448,7 +448,7 @@ class InterfaceDynamics:
             holding += before[rough]
         size = np.linalg.norm(holding, axis=1)
         limit = self._mu[rough] * pressure[rough]
-        holding *= np.minimum(1.0, limit / np.maximum(size, np.finfo(float).tiny))[:, None]
+        holding *= np.divide(limit, size, out=np.ones_like(size), where=size > limit)[:, None]
         out[rough] = holding
         return out
 
