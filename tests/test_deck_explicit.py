@@ -175,6 +175,19 @@ def test_decks_that_are_refused(tmp_path, old, new, words):
     assert "model.inp, line" in str(caught.value)
 
 
+def test_bulk_viscosity_is_left_out_and_said_so(tmp_path):
+    said = "the bulk viscosity of 0.06 and 1.2"
+    assert any(said in line for line in read(tmp_path, DECK).report.replaced)
+
+    def given(numbers):
+        return read(tmp_path, DECK.replace(", 2.\n*B", f", 2.\n*BULK VISCOSITY\n{numbers}\n*B"))
+
+    assert not any("bulk" in line for line in given("0., 0.").report.replaced)
+    assert any("viscosity of 0.03 and 1.2" in line for line in given("0.03").report.replaced)
+    with pytest.raises(DeckError, match="bulk viscosity above the default"):
+        given("0.5, 1.2")
+
+
 @pytest.mark.parametrize(
     "cards, words",
     [

@@ -143,7 +143,7 @@ def test_rotations_of_supports(tmp_path):
     found = supports("ROOT, ENCASTRE")
     assert found == [fx.Displacement("ROOT", x=0.0, y=0.0, z=0.0),
                      fx.Rotation("ROOT", x=0.0, y=0.0, z=0.0)]  # fmt: skip
-    assert fx.Symmetry("ROOT", "x") in supports("ROOT, XSYMM\nROOT, 2, 3")
+    assert fx.Symmetry("ROOT", "x", "ROOT symmetry") in supports("ROOT, XSYMM\nROOT, 2, 3")
     assert fx.Rotation("ROOT", y=0.0) in supports("ROOT, 1, 3\nROOT, 5")
     turn = supports("ROOT, 1, 4", "*BOUNDARY\nROOT, 5, 5, 0.01")[1]
     assert turn == fx.Rotation("ROOT", x=0.0, y=0.01)

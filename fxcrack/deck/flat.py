@@ -446,6 +446,17 @@ class Flat:
             )
         return np.asarray(rows)
 
+    def node_names(self, nodes: Ints) -> tuple[str, ...]:
+        """Names of nodes in the deck, "12" or "instance.12"; "-" of nodes that were added."""
+        out = ["-"] * len(nodes)
+        for placed in self.placed.values():
+            labels = placed.space.nodes.labels
+            prefix = f"{placed.space.name}." if placed.space is not self.model.root else ""
+            mine = (nodes >= placed.first_node) & (nodes < placed.first_node + len(labels))
+            for i in np.flatnonzero(mine):
+                out[i] = f"{prefix}{int(labels[nodes[i] - placed.first_node])}"
+        return tuple(out)
+
     # -- sets for supports ---------------------------------------------------------------
 
     def with_centres(self, nodes: Ints) -> Ints:

@@ -304,7 +304,7 @@ class Boundary:
         for axis in range(3):  # planes of symmetry hold the director on curved shells as well
             others = {3 + (axis + 1) % 3, 3 + (axis + 2) % 3}
             if held == others and axis in still and not turning:
-                return [Symmetry(where, _AXES[axis])]
+                return [Symmetry(where, _AXES[axis], name=f"{where} symmetry")]
         if not turning:
             return [Rotation(where, **{_AXES[d - 3]: 0.0 for d in sorted(held)})]  # type: ignore[arg-type]
         by_amplitude: dict[str, tuple[object, dict[str, float]]] = {}

@@ -25,6 +25,7 @@ from fxcrack.deck.rules import check_density, check_explicit, check_shells, dens
 from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
+from fxcrack.deck.tips import NodeNames
 from fxcrack.deck.tracks import Amplitudes
 from fxcrack.deck.velocity import StartingVelocity, starting_velocity
 from fxcrack.effects import FiniteStrain
@@ -57,12 +58,14 @@ class Translated:
         steps: The steps.
         report: What was read and replaced.
         raw: The mesh.
+        nodes: Names of the slave nodes of interfaces that may come apart, by title.
     """
 
     arguments: dict[str, Any]
     steps: list[DeckStep]
     report: Report
     raw: RawMesh
+    nodes: dict[str, NodeNames]
 
 
 def translate(model: Model, report: Report, order: int | None = None) -> Translated:
@@ -106,7 +109,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         thermal = [c for c in of_step if c.keyword == "TEMPERATURE"]
         temperatures.take(thermal, amplitudes, procedure.period)
         grow = contacts.take(number, of_step)
-        steps.append(DeckStep(family.name, procedure.step, tuple(grow)))
+        steps.append(DeckStep(family.name, procedure.step, tuple(grow), grow))
     sections = read_sections(flat, groups, report)
     _check_finite(finite, sections, model)
     if flat.kind.shell:
@@ -126,8 +129,12 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     )
     debonds, bonds = contacts.build(model.interactions, held)
     if explicit:
-        grow = [d.interface.title for d in debonds]
-        steps = [DeckStep(s.name, s.step, tuple(grow)) for s in steps]
+        titles = [d.interface.title for d in debonds]
+        steps = [
+            DeckStep(s.name, s.step, tuple(titles), dict.fromkeys(titles, s.step.rows))
+            for s in steps
+            if isinstance(s.step, Explicit)
+        ]
     densities = {n: density_of(m) for n, m in sections.materials.items()}
     arguments: dict[str, Any] = {
         "materials": sections.materials,
@@ -147,7 +154,11 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     }
     raw = groups.raw_mesh()
     _tell(report, flat, arguments, steps)
-    return Translated(arguments, steps, report, raw)
+    nodes = {
+        title: NodeNames(flat.points[found], flat.node_names(found))
+        for title, found in contacts.slave_nodes().items()
+    }
+    return Translated(arguments, steps, report, raw, nodes)
 
 
 def _order(model: Model, report: Report, order: int | None, *, explicit: bool) -> int | None:

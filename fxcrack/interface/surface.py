@@ -169,7 +169,7 @@ class FacetSurface:
         return float(np.median(edges))
 
 
-def _closure_table(cell: basix.CellType, order: int) -> tuple[str, Ints]:
+def closure_table(cell: basix.CellType, order: int) -> tuple[str, Ints]:
     """Facet cell and, per local facet, the cell's dofs in the facet element's order."""
     tdim = len(basix.topology(cell)) - 1
     element = basix.create_element(
@@ -209,7 +209,7 @@ def facet_nodes(
     to_cell, to_facet = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
     cells = np.asarray(to_cell.array[to_cell.offsets[facets]], dtype=np.int32)
     element = continuum.space.element.basix_element
-    kind, table = _closure_table(element.cell_type, continuum.order)
+    kind, table = closure_table(element.cell_type, continuum.order)
     around = to_facet.array.reshape(-1, len(table))[cells]
     local = np.argmax(around == facets[:, None], axis=1)
     nodes = continuum.space.dofmap.list[cells[:, None], table[local]]

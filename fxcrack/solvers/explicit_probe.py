@@ -89,6 +89,18 @@ class ExplicitFrontProbe:
         return self._vectors(nodes, self._values.jumps)
 
     @property
+    def bodies(self) -> Any:
+        """Not to be integrated over: their state is no equilibrium.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError(
+            "method='domain' integrates over bodies in equilibrium, which explicit dynamics does "
+            "not have; use method='vcct'"
+        )
+
+    @property
     def has_face_loads(self) -> bool:
         """Whether loads act on the faces of any interface."""
         return self._values.face_loads is not None

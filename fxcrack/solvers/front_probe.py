@@ -12,6 +12,7 @@ from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.base import Solver
+from fxcrack.solvers.condensed_bodies import CondensedBodies
 
 _UNBOUNDED = 1e100
 """Jump per force of nodes that hold a body alone."""
@@ -30,6 +31,7 @@ class CondensedFrontProbe:
         self._p = p
         self.front: Front = solver.fronts[p]
         self.gdim: int = solver.continuum.gdim
+        self.bodies = CondensedBodies(solver)
 
     @property
     def pair(self) -> Pair:

@@ -547,8 +547,23 @@ class NewtonSolver(InterfaceSolver):
         return self.bodies.work()
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
-        """Accepted displacement; the caller destroys it."""
-        return self.u.copy()
+        """Displacement of a state; collective; the caller destroys it.
+
+        Args:
+            state: The accepted state (the default), the last trial, or one that the tangent
+                predicts from the accepted state.
+        """
+        if state is None or state is self.state:
+            return self.u.copy()
+        if self._trial is not None and state is self._trial.end:
+            return self._trial.u.copy()
+        here, n = self.state, self.system.n_retained
+        last = np.zeros(self.tangent.coordinates.n_last)
+        last[:n] = state.jump - here.jump
+        last[n : n + self.n_loads] = state.loads - here.loads
+        out = self.tangent.condensation.displacement(last)
+        out.axpy(1.0, self.u)
+        return out
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them."""

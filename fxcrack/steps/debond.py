@@ -90,6 +90,13 @@ class Debond:
                 f"{'' if self.criterion.knows_toughness else ', which knows no toughness'}; use "
                 f"{release_laws.names_of(possible)}"
             )
+        gradual = self.release.driver != "once" or self.criterion.softens
+        if gradual and any(c.needs_free_faces for c in (self.criterion, *self.watch)):
+            raise InputError(
+                f"{where}: method='domain' needs crack faces without bond forces, which a gradual "
+                "release leaves behind the tip; use StepRelease() (and VCCT), or method='vcct' or "
+                "method='closure'"
+            )
         try:
             self.criterion.check_bond(normal_only=self.interface.normal_only)
         except InputError as error:
