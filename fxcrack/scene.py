@@ -40,7 +40,7 @@ from fxcrack.step_run import check_step, checked_observers, run_step
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.cycles import Cycles
-from fxcrack.steps.debond import Debond
+from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
@@ -268,6 +268,8 @@ class Scene:
         """Run a step whose arguments were checked; collective."""
         if isinstance(step, Explicit):
             self._use_explicit(step, chosen, accuracy)
+        else:
+            check_friction(chosen, self.analysis.pairs)
         first = run_step(
             self.analysis, step, chosen, self._files,
             checkpoint=checkpoint, restart=restart, save=save,

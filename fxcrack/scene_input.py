@@ -182,7 +182,7 @@ def compose(given: SceneInput) -> Analysis:
         )
         for one in given.interfaces
     ]
-    check_friction(given.debonds, pairs)
+    check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver)
     parts = continuum, pairs, supports, loads, list(given.monitors)

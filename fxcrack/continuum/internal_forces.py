@@ -146,6 +146,10 @@ class InternalForces:
             matrix.destroy()
         return self._matrix
 
+    def forget_stiffness(self) -> None:
+        """Free the memory of :meth:`stiffness`, which is assembled again where it is needed."""
+        self._matrix = None
+
     def _product(self) -> Array:
         return np.asarray(self.stiffness() @ self.u.x.array)
 

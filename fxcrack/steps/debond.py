@@ -126,7 +126,7 @@ def check_criterion(where: str, criterion: Criterion) -> None:
 
 
 def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
-    """Refuse bonds that soften with their opening beside friction.
+    """Refuse bonds that soften with their opening beside friction, but for explicit dynamics.
 
     Raises:
         InputError: A debond has such a release law.
@@ -136,9 +136,9 @@ def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
         if rough and softens(debond):
             raise InputError(
                 f"interface '{debond.interface.title}' is released progressively with its opening, "
-                f"which is not possible beside friction (interface '{rough[0]}'); use "
-                "StepRelease(), RampRelease(increments=...) or AmplitudeRelease(...), or leave "
-                "friction out"
+                f"which is not possible beside friction (interface '{rough[0]}') but in explicit "
+                "dynamics; use StepRelease(), RampRelease(increments=...) or "
+                "AmplitudeRelease(...), leave friction out, or take an Explicit step"
             )
 
 
