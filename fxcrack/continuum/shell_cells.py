@@ -175,7 +175,8 @@ class ShellCells:
         mesh = self._mesh
         x = mesh.domain.geometry.x[compat.geometry_dofmap(mesh.domain)[self.stacking.cells].ravel()]
         ends = np.concatenate([x, -x]).reshape(2, -1, 3).max(axis=1, initial=-np.inf)
-        length = float(np.linalg.norm(mesh.comm.allreduce(ends, op=MPI.MAX).sum(axis=0)))
+        highest = np.max(mesh.comm.allgather(ends), axis=0)  # MPI.MAX compares no arrays
+        length = float(np.linalg.norm(highest.sum(axis=0)))
         lost = _LOST * (length / self.thickness) ** 4
         if lost > _TOO_MUCH_LOST:
             log.warn(
