@@ -17,6 +17,10 @@ from fxcrack.solvers.condensed_bodies import CondensedBodies
 _OF_PRODUCTS = 1e-11
 """Round-off of a bond force as a part of the products it is the sum of, where no more is known."""
 
+_MOST_ROUND_OFF = 1e-6
+"""Largest relative round-off of an entry that counts here. Scenes with more have been warned of,
+and the bound exceeds forces that still hold two digits there."""
+
 _UNBOUNDED = 1e100
 """Jump per force of nodes that hold a body alone."""
 
@@ -56,7 +60,8 @@ class CondensedFrontProbe:
         index = self._solver.index[self._p][nodes]
         x = np.abs(np.concatenate([state.jump, state.loads]))
         # an entry S_ij is off by what those on the diagonal of the bodies' matrix allow
-        error = np.broadcast_to(np.asarray(system.cholesky.round_off), len(system.schur))
+        relative = np.minimum(system.cholesky.round_off, _MOST_ROUND_OFF)
+        error = np.broadcast_to(relative, len(system.schur))
         each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
         if not each.any() and system.n_retained:
             each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
