@@ -133,7 +133,7 @@ def _explicit(analysis: Analysis, solver: ExplicitSolver) -> Explanation:
     ]
     seconds = dict(solver.timings.seconds)
     return Explanation(
-        plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, tuple(notes)
+        plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, notes=tuple(notes)
     )
 
 
