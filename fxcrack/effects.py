@@ -76,6 +76,11 @@ def _is_finite(forms: set[str], effects: Sequence[Any]) -> bool:
     return any(isinstance(e, FiniteStrain) for e in effects) or "neo_hookean" in forms
 
 
+def is_finite(continuum: Continuum, effects: Sequence[Any]) -> bool:
+    """Whether strains and rotations of some bodies are finite, so that open faces slide."""
+    return _is_finite(_forms(continuum), effects)
+
+
 def _follows(load: Load) -> bool:
     """Whether a load is a pressure that follows the bodies."""
     return isinstance(load, Pressure) and load.follows

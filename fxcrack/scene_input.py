@@ -44,7 +44,7 @@ from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry
 from fxcrack.continuum.section import Section
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
-from fxcrack.effects import dead_loads, form_terms, plan, temperature_of
+from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
 from fxcrack.history import History
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports
@@ -172,13 +172,15 @@ def compose(given: SceneInput) -> Analysis:
         temperature=temperature_of(given.effects),
     )
     supports = collect_supports(continuum, list(given.supports))
+    inertia = any(isinstance(e, Inertia) for e in given.effects)
+    slides = is_finite(continuum, given.effects)
     pairs = [
         make_pair(
             continuum,
             one,
             others=[i for i in given.interfaces if i is not one],
             supported=supports.which,
-            lumped=any(isinstance(e, Inertia) for e in given.effects),
+            by_nodes=inertia or (one.contact and slides),
         )
         for one in given.interfaces
     ]

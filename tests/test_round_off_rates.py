@@ -44,3 +44,18 @@ def test_no_onset_from_round_off(method: Any, supports: list[fx.Displacement]) -
     assert [row["event"] for row in history] == ["start", "end"]
     assert "not reached" in history.reason
     scene.close()
+
+
+def test_no_onset_from_round_off_in_other_units() -> None:
+    """N and m in place of N and mm: entries of the stiffness are 1000 times as large."""
+    mesh = dcb_2d(MPI.COMM_SELF, length=100.0, dx=2.0, ny=1)
+    mesh.domain.geometry.x[:] *= 1e-3
+    scene = specimen(
+        mesh,
+        a0=30e-3,
+        supports=[fx.Displacement(s.where, x=0.0, y=1e-3) for s in TOGETHER],
+        materials=fx.Isotropic(70e9, 0.3),
+        criterion=fx.VCCT(GIc=200.0),
+    )
+    history = scene.run(fx.Static(until=fx.Releases(2)), progress=False)
+    assert [row["event"] for row in history] == ["start", "end"]

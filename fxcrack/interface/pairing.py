@@ -75,8 +75,9 @@ class Interface:
             both sides have the same nodes and facets, in which case the two are equal, and
             surface-to-surface elsewhere; the nodes of the history are then those of the coarser or
             much softer side, slave or master, unless ``bonded`` names slave nodes. With ``Inertia``
-            it is always node-to-surface. Node-to-surface bonds of meshes that do not match hold
-            only if the slave is the finer and softer side.
+            and for contact at finite strain node-to-surface is the default, and in ``Explicit`` the
+            only one; so it is where no slave node has a master at the start. Node-to-surface bonds
+            of meshes that do not match hold only if the slave is the finer and softer side.
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
         strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
             and ignored otherwise.
@@ -387,7 +388,7 @@ def make_pair(
     *,
     others: Sequence[Interface] = (),
     supported: Ints | None = None,
-    lumped: bool = False,
+    by_nodes: bool = False,
 ) -> Pair:
     """Pair slave and master surface; collective, the same result on every rank.
 
@@ -398,8 +399,9 @@ def make_pair(
             keep their roles.
         supported: Support of each owned dof, -1 where free, shape (n_local,); where one holds the
             master and not the slave, they keep their roles as well.
-        lumped: Whether the bodies may have lumped masses, which weights below 0 would make
-            negative: node-to-surface is then the default.
+        by_nodes: Whether node-to-surface is the default: where bodies may have lumped masses,
+            which weights below 0 would make negative, and where faces slide and are paired anew,
+            which gives and takes energy with means over facets.
 
     Raises:
         InterfaceError: A bonded slave node lies outside the master surface, the two surfaces
@@ -425,7 +427,7 @@ def make_pair(
             f"{foot.distance[i]:.3g} (search tolerance {tolerance:.3g}); let the master surface "
             "extend under them, take them out of the bonded set, or raise Interface(tolerance=...)"
         )
-    pairing = interface.pairing or ("node-to-surface" if lumped else None)
+    pairing = interface.pairing or ("node-to-surface" if by_nodes else None)
     role = Role.SURFACES if pairing == "surface-to-surface" else Role.NODES
     if not grown.any() and not matching(slave, master, foot, paired):
         # both sides of a border inside the body share its nodes, and have the same mesh there

@@ -59,9 +59,10 @@ def stiffness_ratio(continuum: Continuum, slave: str | Face, master: str | Face)
         total = np.zeros(2)
         for material, own in zip(continuum.part_materials, continuum.part_cells, strict=True):
             count = int(np.isin(cells, own).sum())
-            if count:
-                stiffness = float(np.diag(stiffness_of(material))[:3].mean())
-                total += np.array([count, count * stiffness])
+            # of shells that of their plies; asked for on every rank, as it may raise an error
+            solid = getattr(material, "laminate", material)
+            stiffness = float(np.diag(stiffness_of(solid))[:3].mean())
+            total += np.array([count, count * stiffness])
         total = continuum.comm.allreduce(total)
         found.append(float(total[1] / max(total[0], 1.0)))
     return found[0] / found[1] if found[1] > 0.0 else 1.0

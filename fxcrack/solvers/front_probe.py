@@ -17,9 +17,9 @@ from fxcrack.solvers.condensed_bodies import CondensedBodies
 _OF_PRODUCTS = 1e-11
 """Round-off of a bond force as a part of the products it is the sum of, where no more is known."""
 
-_MOST_ROUND_OFF = 1e-6
-"""Largest relative round-off of an entry that counts here. Scenes with more have been warned of,
-and the bound exceeds forces that still hold two digits there."""
+_MOST_ROUND_OFF = 1e-9
+"""Largest round-off of an entry that counts here, as a part of the entry on the diagonal. Scenes
+with more have been warned of, and the bound exceeds forces that still hold two digits there."""
 
 _UNBOUNDED = 1e100
 """Jump per force of nodes that hold a body alone."""
@@ -60,8 +60,8 @@ class CondensedFrontProbe:
         index = self._solver.index[self._p][nodes]
         x = np.abs(np.concatenate([state.jump, state.loads]))
         # an entry S_ij is off by what those on the diagonal of the bodies' matrix allow
-        relative = np.minimum(system.cholesky.round_off, _MOST_ROUND_OFF)
-        error = np.broadcast_to(relative, len(system.schur))
+        most = _MOST_ROUND_OFF * np.abs(np.diagonal(system.schur))
+        error = np.minimum(system.cholesky.round_off, most)
         each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
         if not each.any() and system.n_retained:
             each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
@@ -118,7 +118,9 @@ class CondensedFrontProbe:
             across[range(k), :, range(k)] = np.einsum("kci,c->ki", frames, normal[: self.gdim])
             held = across[free]
             given = cho_solve((factor, True), held)
-            jump[free] -= given @ np.linalg.lstsq(held.T @ given, held.T @ jump[free])[0]
+            jump[free] -= (
+                given @ np.linalg.lstsq(held.T @ given, held.T @ jump[free], rcond=None)[0]
+            )
         world = np.zeros((len(index), 3))
         world[:, : self.gdim] = np.einsum("kci,ki->kc", frames, jump)
         return world
