@@ -11,9 +11,18 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg.blas import daxpy
-from scipy.sparse import _sparsetools
 
 from fxcrack.base.arrays import Array, Ints
+
+try:  # no public function of SciPy adds to an array
+    from scipy.sparse._sparsetools import csr_matvec
+except ImportError:  # it may move: the public product, which costs more for small matrices
+
+    def csr_matvec(
+        n: int, m: int, starts: Ints, columns: Ints, data: Array, x: Array, y: Array
+    ) -> None:
+        """Add A x to y."""
+        y += sp.csr_matrix((data, columns, starts), shape=(n, m)) @ x
 
 
 class Product:
@@ -82,13 +91,13 @@ class Product:
             y: Shape (n,), contiguous.
         """
         n, m = self.shape
-        _sparsetools.csr_matvec(n, m, self._starts, self._columns, self.data, x, y)
+        csr_matvec(n, m, self._starts, self._columns, self.data, x, y)
 
     def into(self, x: Array, y: Array) -> Array:
         """Write A x over y, and return y; shapes as for :meth:`add`."""
         y.fill(0.0)
         n, m = self.shape
-        _sparsetools.csr_matvec(n, m, self._starts, self._columns, self.data, x, y)
+        csr_matvec(n, m, self._starts, self._columns, self.data, x, y)
         return y
 
     def __call__(self, x: Array) -> Array:

@@ -181,7 +181,7 @@ class DomainIntegral:
         self._source = CellSource(continuum, groups)
         self._on_faces = loads_on_faces(continuum, self._loads)
         self._slaves = probe.pair.surface.dofs
-        self._masters = gather_surface(continuum, probe.pair.interface.master).dofs
+        self._masters = gather_surface(continuum, probe.pair.sides[1]).dofs
         self._ring = isinstance(continuum.model, Axisymmetric)
         self._n_modes = 2 if probe.gdim == 2 else 3
         self._known: dict[tuple[Any, ...], Ring] = {}

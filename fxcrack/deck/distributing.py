@@ -103,6 +103,8 @@ def distributing(coupling: Card, card: Card, reference: int, flat: Flat) -> Dist
     name = coupling.text("SURFACE")
     nodes = flat.surface_nodes(coupling, name)
     nodes = nodes[(nodes != reference) & flat.used[nodes] & (nodes < flat.n_given)]
+    if not len(nodes):
+        coupling.fail(f"no element has a node of surface '{name}'; couple a surface of the body")
     weights = _areas(flat, coupling, name, nodes)
     x = flat.points[nodes]
     centre = weights @ x

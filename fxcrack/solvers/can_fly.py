@@ -31,7 +31,6 @@ def can_fly(
         fronts: Their fronts.
     """
     gdim = continuum.gdim
-    friction = any(pair.friction is not None for pair in pairs)
     bonded, touching, apart = [], [], False
     for pair, front in zip(pairs, fronts, strict=True):
         fixed = np.zeros((pair.surface.n_nodes, gdim), dtype=bool)
@@ -39,7 +38,7 @@ def can_fly(
         held = fixed.copy()
         if pair.interface.contact:
             faces = ~front.bonded & pair.paired
-            held[faces, : gdim if friction else 1] = True
+            held[faces, : gdim if pair.friction is not None else 1] = True
             apart |= bool(np.any(pair.gap[faces] > _APART * pair.surface.facet_size))
         bonded.append(fixed)
         touching.append(held)

@@ -22,6 +22,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
@@ -202,6 +203,7 @@ class InterfaceDynamics:
         self._gaps = np.zeros(len(self._may_touch))
         self._mu = self._friction[rows]
         self._rough = bool(self._mu.any())
+        self._warned_of_sweeps = False
         self._soften()
 
     def _soften(self) -> None:
@@ -390,6 +392,8 @@ class InterfaceDynamics:
             if sweep and settled(strength, before) and settled(pressure, pressed):
                 if holding is None or held is None or settled(holding, held):
                     break
+        else:
+            self._warn_of_sweeps()
         assert forces is not None
         if len(soft):
             acting.softening = strength
@@ -398,6 +402,16 @@ class InterfaceDynamics:
             if holding is not None:
                 acting.friction = touch, holding[touch]
         return forces
+
+    def _warn_of_sweeps(self) -> None:
+        """Say once that contact, friction and softening did not come to agree."""
+        if not self._warned_of_sweeps:
+            self._warned_of_sweeps = True
+            log.warn(
+                "explicit dynamics: forces between faces that touch did not settle in %d sweeps of "
+                "an increment; make the finer side the master, or give both sides the same mesh",
+                SWEEPS,
+            )
 
     def _pressures(self, jumps: Array, pressure: Array, hh: float) -> tuple[Array, Ints]:
         """Contact forces for which touching pairs end at zero distance, and where there are any.
