@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.errors import ComesApart, ConvergenceError, InputError
+from fxcrack.base.errors import ComesApart, ConvergenceError, EnergyImbalance, InputError
 from fxcrack.base.timings import Timings
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Row
@@ -103,7 +103,7 @@ class StepDriver:
             reason = stepping(self)
         except (NotPositiveDefinite, ComesApart) as error:
             reason = _separated(error)
-        except (TooManyCutbacks, ConvergenceError) as error:
+        except (TooManyCutbacks, ConvergenceError, EnergyImbalance) as error:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
         self.record("end")
