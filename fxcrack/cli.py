@@ -156,6 +156,9 @@ def run(
     usual_names: Annotated[
         bool, typer.Option("--usual-names", help="Columns U1, RF1, ENRRT11, ALLSE, ...")
     ] = False,
+    report: Annotated[
+        bool, typer.Option("--report", help="Write report.html: pictures, energies, cost.")
+    ] = False,
 ) -> None:
     """Run a keyword deck, and write its history, fields, bonds and crack tips."""
     from fxcrack.deck.run import check_only, run_deck
@@ -164,7 +167,7 @@ def run(
         check_only(deck, rank_0_console())
         return
     folder = Path("out") / deck.stem if out is None else out
-    run_deck(deck, folder, rank_0_console(), order=order, usual_names=usual_names)
+    run_deck(deck, folder, rank_0_console(), order=order, usual_names=usual_names, report=report)
 
 
 # -- benchmarks ----------------------------------------------------------------------
@@ -172,7 +175,7 @@ def run(
 
 @app.command()
 def bench(
-    name: Annotated[str, typer.Argument(help="dcb2d, dcb3d or scale", metavar="NAME")],
+    name: Annotated[str, typer.Argument(help="dcb2d, dcb3d, scale or explicit", metavar="NAME")],
     dx: Annotated[
         float | None, typer.Option(help="Element length along the arms [0.0625, in 3-D 0.5].")
     ] = None,
@@ -198,14 +201,20 @@ def bench(
     store: Annotated[
         Path | None, typer.Option(help="scale: file for the constants of the cost model.")
     ] = None,
+    cases: Annotated[str, typer.Option(help="explicit: of 4k, 54k, 127k, 211k.")] = "4k,54k",
+    finite: Annotated[bool, typer.Option("--finite", help="explicit: finite strain.")] = False,
 ) -> None:
     """Measure a speed problem: a crack that grows from a = 30 to a = 60 in a DCB.
 
     "scale" compares the direct and the iterative method, 1 rank and several, over sizes.
+    "explicit" measures increments of explicit dynamics beside sparse products of the same matrix.
     """
     _check_outputs([("--json", json_file, False), ("--store", store, False)])
     if name == "scale":
         _scale(sizes, shapes, methods, ranks, limit, memory, json_file, store)
+        return
+    if name == "explicit":
+        _explicit(cases, finite, json_file)
         return
     from fxcrack.bench.problem import Problem
     from fxcrack.bench.speed import run
@@ -216,6 +225,24 @@ def bench(
     show_speed(result, rank_0_console())
     if json_file is not None and MPI.COMM_WORLD.rank == 0:
         write_json(json_file, result)
+
+
+def _explicit(cases: str, finite: bool, json_file: Path | None) -> None:
+    from fxcrack.bench import explicit
+    from fxcrack.bench.tables import show_explicit
+
+    chosen = cases.split(",")
+    unknown = [c for c in chosen if c not in explicit.CASES]
+    if unknown:
+        raise InputError(
+            f"--cases: '{unknown[0]}' is none of the meshes; take some of "
+            f"{', '.join(explicit.CASES)}, with commas"
+        )
+    comm = MPI.COMM_WORLD
+    results = [explicit.run(explicit.CASES[c], comm, finite=finite) for c in chosen]
+    show_explicit(results, rank_0_console())
+    if json_file is not None and comm.rank == 0:
+        write_json(json_file, {"cases": results})
 
 
 def _scale(

@@ -25,6 +25,7 @@ from fxcrack.continuum.shell_elastic import ShellElastic
 from fxcrack.continuum.temperature import Temperature, expansion_of
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
+from fxcrack.continuum.tied_elastic import TiedElastic
 from fxcrack.interface.pairing import Interface
 from fxcrack.solvers.plan import SOLVERS, Plan
 
@@ -64,7 +65,11 @@ def temperature_of(effects: Sequence[Any]) -> Temperature | None:
 
 def _forms(continuum: Continuum) -> set[str]:
     """Which forms the materials need."""
-    return {getattr(m, "form", "elastic") for m in continuum.part_materials}
+    return {
+        getattr(m, "form", "elastic")
+        for i, m in enumerate(continuum.part_materials)
+        if i not in continuum.tied_cells
+    }
 
 
 def _is_finite(forms: set[str], effects: Sequence[Any]) -> bool:
@@ -163,6 +168,8 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     terms: list[Term] = []
     if isinstance(continuum, ShellBodies):
         terms.append(ShellElastic(continuum, finite=_is_finite(forms, effects)))
+    if continuum.tied_cells:
+        terms.append(TiedElastic(continuum, finite=_is_finite(forms, effects)))
     if "elastic" in forms:
         terms.append(Elastic(continuum, finite=_is_finite(forms, effects)))
     if "neo_hookean" in forms:

@@ -17,8 +17,10 @@ G_max[..], dG[..], dadN[..].
 from __future__ import annotations
 
 import csv
+import html
 import json
 import warnings
+from collections import Counter
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -198,6 +200,78 @@ class History:
             )
         return out
 
+    def describe(self) -> str:
+        """What happened, in a few lines: events, first onset, largest load, cracks, energies."""
+        if not self.rows:
+            return "no rows: no step was run"
+        names = self.columns
+        count = Counter(str(row["event"]) for row in self.rows)
+        lines = [
+            f"{len(self.rows)} rows: " + ", ".join(f"{n} {event}" for event, n in count.items()),
+            f"the last step ended: {self.reason or 'not yet'}",
+        ]
+        moving = [c[2:-1] for c in names if c.startswith("u[")]
+        forces = [c[2:-1] for c in names if c.startswith("F[")]
+        for load, x, y in [(t, "u", "R") for t in moving] + [(t, "v", "F") for t in forces]:
+            values = np.abs(self[f"{y}[{load}]"].astype(float))
+            if np.isnan(values).all():
+                continue
+            row = self.rows[int(np.nanargmax(values))]
+            at = row.get(f"{x}[{load}]", np.nan)
+            lines.append(f"largest {y}[{load}]: {row[f'{y}[{load}]']:.6g} at {x} = {at:.6g}")
+        for title in (c[2:-1] for c in names if c.startswith("a[")):
+            a, released = self[f"a[{title}]"].astype(float), self[f"released[{title}]"]
+            lines.append(
+                f"crack {title}: length from {a[0]:.6g} to {a[-1]:.6g}, "
+                f"{int(released[-1])} nodes released"
+            )
+            first = [r for r in self.rows if r["event"] == "onset" and f"f[{title}]" in r]
+            if first:
+                lines.append(f"  first onset at time {float(first[0]['time']):.6g}")
+        energies = [c for c in ("external_work", "strain_energy", "released_energy") if c in names]
+        if energies and "balance" in names:
+            last = ", ".join(f"{c} {float(self[c][-1]):.6g}" for c in energies)
+            off = float(np.nanmax(np.abs(self["balance"].astype(float))))
+            most = max(float(np.nanmax(np.abs(self[c].astype(float)))) for c in energies)
+            lines.append(f"energies at the end: {last}")
+            lines.append(
+                f"largest error of the energy balance: {off:.3g}, {off / (most or 1.0):.1g} "
+                "of the largest of these energies"
+            )
+        return "\n".join(lines)
+
+    def to_frame(self) -> Any:
+        """All rows as a ``pandas.DataFrame``, one column per column.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        try:
+            import pandas as pd  # optional: only those who ask for a frame need it
+        except ImportError as error:
+            raise InputError(
+                "to_frame needs pandas, which is not installed; install it (pip install pandas), "
+                "or use history['column'] and history.to_csv(path)"
+            ) from error
+        return pd.DataFrame(self.rows, columns=self.columns)
+
+    def _repr_html_(self) -> str:
+        """The description and the first and last rows, for notebooks."""
+        rows, names = self.rows, self.columns
+        shown = rows if len(rows) <= 12 else [*rows[:6], {}, *rows[-6:]]
+
+        def cell(row: Row, name: str) -> str:
+            value = row.get(name, "")
+            text = f"{value:.6g}" if isinstance(value, float) else str(value)
+            return f"<td>{html.escape(text if row else '...')}</td>"
+
+        head = "".join(f"<th>{html.escape(name)}</th>" for name in names)
+        body = "".join(f"<tr>{''.join(cell(row, n) for n in names)}</tr>" for row in shown)
+        return (
+            f"<pre>{html.escape(self.describe())}</pre><table><thead><tr>{head}</tr></thead>"
+            f"<tbody>{body}</tbody></table>"
+        )
+
     def to_csv(self, path: str | Path) -> None:
         """Write all rows as comma-separated values; collective, rank 0 writes."""
         with all_or_none(self._comm, f"writing {path}"):
@@ -225,22 +299,25 @@ class History:
 
     def plot(
         self,
-        path: str | Path,
+        path: str | Path | None = None,
         *,
         x: str | npt.ArrayLike | None = None,
         y: str | npt.ArrayLike | None = None,
         **options: Any,
-    ) -> None:
+    ) -> Any:
         """Plot load against opening; collective.
 
         Args:
-            path: Picture file (.png, .pdf, .svg).
+            path: Picture file (.png, .pdf, .svg), or ``None`` for none.
             x: Column or array of shape (n_rows,); by default the first prescribed displacement
                 that is not fixed, else the displacement of the first load, absolute value.
             y: Column or array of shape (n_rows,); by default the reaction or load that belongs to
                 it, absolute value.
             **options: As for :func:`fxcrack.output.plots.curves.load_opening`: reference curves
-                ``[(label, x, y)]``, xlabel, ylabel, label, title.
+                ``[(label, x, y)]``, xlabel, ylabel, label, title, ax.
+
+        Returns:
+            The ``matplotlib`` figure on rank 0, ``None`` on the others.
 
         Raises:
             InputError: A column is unknown, or there is none to choose.
@@ -248,4 +325,4 @@ class History:
         """
         from fxcrack.output import plots  # loads matplotlib: only those who plot wait for it
 
-        plots.load_opening(self, path, x=x, y=y, **options)
+        return plots.load_opening(self, path, x=x, y=y, **options)

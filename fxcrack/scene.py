@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import check_instance, check_list, flag
 from fxcrack.base.errors import InputError
@@ -39,7 +40,7 @@ from fxcrack.step_run import check_step, checked_observers, run_step
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.cycles import Cycles
-from fxcrack.steps.debond import Debond
+from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
@@ -96,6 +97,7 @@ class Scene:
         newton: NewtonOptions | None = None,
         path: str | None = None,
     ) -> None:
+        self._n_warned = log.n_warned()
         self.input = SceneInput(
             mesh=mesh,
             materials=materials,
@@ -266,6 +268,8 @@ class Scene:
         """Run a step whose arguments were checked; collective."""
         if isinstance(step, Explicit):
             self._use_explicit(step, chosen, accuracy)
+        else:
+            check_friction(chosen, self.analysis.pairs)
         first = run_step(
             self.analysis, step, chosen, self._files,
             checkpoint=checkpoint, restart=restart, save=save,
@@ -316,6 +320,34 @@ class Scene:
         if self.mesh.comm.rank == 0:
             print(found)
         return found
+
+    def _repr_html_(self) -> str:
+        """What :meth:`explain` says, for notebooks."""
+        return explain(self)._repr_html_()
+
+    def report(self, path: str | Path, *, title: str = "Crack growth analysis") -> None:
+        """Write one HTML file about the steps run so far; collective.
+
+        It holds the explanation, the description of the history, the warnings since the scene was
+        made, the accuracy if it was asked for, pictures of load, growth and energies, the cost by
+        phase and the rows of the history.
+
+        Args:
+            path: HTML file.
+            title: Heading.
+
+        Raises:
+            InputError: No step was run yet, or Jinja2 is not installed.
+            FxcrackError: The file could not be written.
+        """
+        try:
+            from fxcrack.output.report import write_report  # loads Jinja2 and matplotlib
+        except ModuleNotFoundError as error:
+            raise InputError(
+                f"report needs {error.name}, which is not installed; install it "
+                f"(pip install {error.name}, Debian: python3-{error.name})"
+            ) from error
+        write_report(self, path, title=title, warnings=log.warned_since(self._n_warned))
 
     def close(self) -> None:
         """Free all PETSc objects; collective. The history stays.

@@ -19,6 +19,7 @@ from fxcrack.base.checks import (
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import (
     Axisymmetric,
     Model,
@@ -170,9 +171,18 @@ def compose(given: SceneInput) -> Analysis:
         order=given.order,
         temperature=temperature_of(given.effects),
     )
-    pairs = [make_pair(continuum, i) for i in given.interfaces]
-    check_friction(given.debonds, pairs)
     supports = collect_supports(continuum, list(given.supports))
+    pairs = [
+        make_pair(
+            continuum,
+            one,
+            others=[i for i in given.interfaces if i is not one],
+            supported=supports.which,
+            lumped=any(isinstance(e, Inertia) for e in given.effects),
+        )
+        for one in given.interfaces
+    ]
+    check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver)
     parts = continuum, pairs, supports, loads, list(given.monitors)

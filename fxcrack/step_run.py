@@ -154,6 +154,8 @@ def _prepare(
             restarts.put_in_equilibrium()
         return
     solver = analysis.condensed
+    if not (restarts.resumes or analysis.started) and isinstance(step, Static):
+        solver.begin_motion(step.initial)
     solver.prepare(may_grow, _reach(analysis, step))
     if restarts.resumes:
         restarts.put_in_equilibrium()

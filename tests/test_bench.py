@@ -14,10 +14,10 @@ from rich.console import Console
 
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.machine import peak_memory
-from fxcrack.bench import measure
+from fxcrack.bench import explicit, measure
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.bench.speed import run
-from fxcrack.bench.tables import show_speed
+from fxcrack.bench.tables import show_explicit, show_speed
 
 COMM = MPI.COMM_WORLD
 KEYS = {
@@ -192,3 +192,19 @@ def test_repeating_keeps_the_fastest(monkeypatch: pytest.MonkeyPatch, repeat: in
     result = run(Problem.make("dcb2d", 2.5), COMM, memory=False, repeat=repeat)
     assert len(totals) == repeat
     assert result["seconds"]["total"] == min(totals)
+
+
+# -- explicit dynamics ---------------------------------------------------------------
+
+
+def test_increments_of_explicit_dynamics_are_measured_beside_products() -> None:
+    small = explicit.Case("tiny", 2, 40.0, 2.0, 1)
+    result = explicit.run(small, COMM, increments=3)
+    assert result["dofs"] == 2 * 2 * 21 * 2
+    assert result["ms_per_increment"] > 0.0
+    assert result["ratio"] == pytest.approx(result["ms_per_increment"] / result["ms_once"])
+    buffer = io.StringIO()
+    show_explicit([result], Console(file=buffer, width=200))
+    assert "one sparse product" in buffer.getvalue()
+    with pytest.raises(InputError, match="at least 1"):
+        explicit.run(small, COMM, increments=0)

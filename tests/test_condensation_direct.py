@@ -17,7 +17,7 @@ from fxcrack.condensation import direct as condensation
 from fxcrack.condensation import mumps_schur as petsc_schur
 from fxcrack.condensation.mumps_schur import (
     SchurFactor,
-    factor_problem,
+    check_factor,
     mirror_lower,
     mumps_message,
 )
@@ -247,15 +247,22 @@ def test_workspace_grows_until_it_is_enough(
 
 def test_messages() -> None:
     good = {1: 0, 2: 0, 12: 0}.__getitem__
-    assert factor_problem(good, {19: 1.0, 21: 1e6}.__getitem__) is None
+    check_factor(good, {19: 1.0, 21: 1e6}.__getitem__)
     # a MUMPS that does not tell pivots
-    assert factor_problem(good, {19: 0.0, 21: 0.0}.__getitem__) is None
+    check_factor(good, {19: 0.0, 21: 0.0}.__getitem__)
+    asked: list[float] = []
+    small = good, {19: 1e-12, 21: 1.0}.__getitem__
+    check_factor(*small, doubt=asked.append)
+    check_factor({1: 0, 12: 1}.__getitem__, {}.__getitem__, doubt=asked.append)
+    check_factor(*small, definite=False)
+    assert asked == [1e-12, 0.0]
     for infog, pivots in (
         ({1: 0, 12: 1}, {19: 1.0, 21: 1.0}),
         ({1: 0, 12: 0}, {19: 1e-12, 21: 1.0}),
         ({1: -10, 2: 3, 12: 0}, {}),
     ):
-        assert "singular" in (factor_problem(infog.__getitem__, pivots.__getitem__) or "")
+        with pytest.raises(SolverError, match="singular"):
+            check_factor(infog.__getitem__, pivots.__getitem__)
     assert "out of memory" in mumps_message(-13, 0)
     assert "INFOG(1) = -5, INFOG(2) = 7" in mumps_message(-5, 7)
 

@@ -338,6 +338,23 @@ def test_distances_and_first_lengths_that_do_not_fit(tmp_path, caplog):
     assert "will never propagate" in caplog.text and history.rows[-1]["released[TOP]"] == 0
 
 
+def test_tables_are_not_continued_behind_their_end(tmp_path):
+    model = BONDED + "*NSET, NSET=START\n1\n"
+    length = "*FRACTURE CRITERION, TYPE=CRACK LENGTH, NSET=START\n0., 1., 0.5, 2.2"
+    history = fx.read_deck(write(tmp_path, bonded(length, model=model))).run()
+    # 2.2 frees the node at 2; a line through both points would reach 3.4 and free the one at 3
+    assert history.rows[-1]["time"] == 1.0 and history.rows[-1]["released[TOP]"] == 2
+
+
+def test_a_run_stops_after_the_largest_number_of_cutbacks(tmp_path):
+    few = "*CONTROLS, PARAMETERS=TIME INCREMENTATION\n, , , , , , , 1\n"
+    step = OPENED.replace("*BOUNDARY", few + "*BOUNDARY").replace("0.1, 1.", "1., 1.")
+    narrow = "*FRACTURE CRITERION, TYPE=VCCT, TOLERANCE=1E-6\n1E-3, 1E-3, 1E-3, 2.0"
+    history = fx.read_deck(write(tmp_path, bonded(narrow, step=step))).run()
+    assert "after 1 cutbacks" in history.reason and history.rows[-1]["time"] < 1.0
+    assert history.rows[-1]["released[TOP]"] == 0
+
+
 def test_few_elements_behind_the_tip_are_warned_of(tmp_path, caplog):
     model = BONDED.replace("SMALL SLIDING,", "SMALL SLIDING, TYPE=SURFACE TO SURFACE,")
     with caplog.at_level(logging.WARNING, "fxcrack"):

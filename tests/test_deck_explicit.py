@@ -165,18 +165,27 @@ def test_a_surface_that_ends_with_the_bonded_set_is_warned_of(tmp_path, caplog):
         ("*DENSITY", "*PLASTIC\n1.\n*DENSITY", "plasticity is not available in explicit"),
         ("*BOUNDARY, AMPLITUDE=A", "*BOUNDARY", "jumps at the beginning of an explicit step"),
         ("*BOUND", "*TEMPERATURE\n1, 5.\n*BOUND", "temperatures are not available in explicit"),
-        ("CPE4", "CPE4H", None),
         ("*STEP, NLGEOM=NO\n*DYN", "*STEP\n*DYNAMIC\n0.1, 1.\n*END STEP\n*STEP\n*DYN", "as two"),
     ],
 )
 def test_decks_that_are_refused(tmp_path, old, new, words):
     assert old in DECK
-    if words is None:
-        read(tmp_path, DECK.replace(old, new))
-        return
     with pytest.raises(DeckError, match=words) as caught:
         read(tmp_path, DECK.replace(old, new))
     assert "model.inp, line" in str(caught.value)
+
+
+def test_bulk_viscosity_is_left_out_and_said_so(tmp_path):
+    said = "the bulk viscosity of 0.06 and 1.2"
+    assert any(said in line for line in read(tmp_path, DECK).report.replaced)
+
+    def given(numbers):
+        return read(tmp_path, DECK.replace(", 2.\n*B", f", 2.\n*BULK VISCOSITY\n{numbers}\n*B"))
+
+    assert not any("bulk" in line for line in given("0., 0.").report.replaced)
+    assert any("viscosity of 0.03 and 1.2" in line for line in given("0.03").report.replaced)
+    with pytest.raises(DeckError, match="bulk viscosity above the default"):
+        given("0.5, 1.2")
 
 
 @pytest.mark.parametrize(
@@ -205,6 +214,13 @@ def test_bodies_begin_with_a_velocity(tmp_path):
     # free flight of two bars of mass 4 over the time 2
     assert last["kinetic_energy"] == pytest.approx(0.5 * 8.0 * 9.0, rel=1e-10)
     assert last["m[U1 BOND]"] == pytest.approx(6.0, rel=1e-10)
+    deck.scene.close()
+
+
+def test_a_body_without_interfaces_flies(tmp_path):
+    text = MOVING + "*STEP, NLGEOM=NO\n*DYNAMIC, EXPLICIT\n, 0.1\n*END STEP\n"
+    deck = fx.read_deck(write(tmp_path, text))
+    assert deck.run().rows[-1]["kinetic_energy"] == pytest.approx(0.5 * 8.0 * 9.0, rel=1e-10)
     deck.scene.close()
 
 

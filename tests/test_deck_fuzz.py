@@ -12,7 +12,10 @@ from hypothesis import HealthCheck, given, settings
 from fxcrack.deck.cards import DeckError
 from fxcrack.deck.deck import translated
 from tests.decks import BONDED, OPENED, PLATE, STEP, VCCT
+from tests.test_deck_distributing import BLOCK
+from tests.test_deck_explicit import DECK as EXPLICIT
 from tests.test_deck_mesh import GENERATED, PARTS
+from tests.test_deck_surface_shells import ARMS as SHELLS
 
 BASE = [
     PLATE + STEP,
@@ -25,6 +28,9 @@ BASE = [
     "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 20.\n*STEP, NLGEOM\n*STATIC\n0.1, 1.\n"
     "*BOUNDARY, AMPLITUDE=A\nLEFT, 1, 2\n*BOUNDARY\nREF, 1, 6, 0.1\n*CLOAD\n6, 2, 1.\n"
     "*DLOAD\nLAST, P3, 1.\n*TEMPERATURE\nALL, 30.\n*END STEP\n",
+    EXPLICIT,
+    SHELLS,
+    BLOCK.format(nlgeom="", load="*CLOAD\nREF, 3, 1.\nREF, 4, 1."),
 ]
 WORDS = st.sampled_from(
     [

@@ -46,7 +46,7 @@ def test_replaced_and_refused_element_types():
     assert "order=2" in element_type("CPE4I").notes[0]
     assert element_type("C3D10M").order == 2 and element_type("CAX8").model == "axisymmetric"
     for name, words in {
-        "S4R": "shells", "SC6R": "prisms", "C3D6": "prisms", "COH3D8": "cohesive",
+        "STRI65": "triangles", "SC6R": "prisms", "C3D6": "prisms", "COH3D8": "cohesive",
         "B31": "beams", "U1": "user elements", "CPE4RT": "temperatures", "CPEG4": "generalised",
         "C3D7": "not known", "R3D4": "rigid",
     }.items():  # fmt: skip
@@ -55,9 +55,9 @@ def test_replaced_and_refused_element_types():
 
 def test_refused_elements_name_file_line_and_remedy(tmp_path):
     with pytest.raises(DeckError) as caught:
-        read(tmp_path, PLATE.replace("CPE4", "S4R") + STEP)
-    assert "model.inp, line 10: element type S4R is refused: shells" in str(caught.value)
-    assert "use continuum shells" in str(caught.value)
+        read(tmp_path, PLATE.replace("CPE4", "COH2D4") + STEP)
+    assert "model.inp, line 10: element type COH2D4 is refused: cohesive" in str(caught.value)
+    assert "use *DEBOND" in str(caught.value)
 
 
 @pytest.mark.parametrize(

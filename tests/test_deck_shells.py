@@ -88,8 +88,8 @@ def test_a_strip_of_three_plies(tmp_path):
         (", ORIENTATION=O", ", STACK DIRECTION=1", "STACK DIRECTION must be 3"),
         (", ORIENTATION=O", ", POISSON=0.3", "POISSON is not available"),
         ("MATERIAL=PLY", "MATERIAL=NO", "there is no material 'NO'"),
-        ("*SHELL SECTION", "*SOLID SECTION", "continuum shell elements need"),
-        (", ORIENTATION=O", ", OFFSET=SPOS", "the parameter OFFSET is not available"),
+        ("*SHELL SECTION", "*SOLID SECTION", "shell elements need"),
+        (", ORIENTATION=O", ", OFFSET=SPOS", "OFFSET and SYMMETRIC are not available in continuum"),
     ],
 )
 def test_shell_sections_that_are_refused(tmp_path, old, new, words):

@@ -26,6 +26,7 @@ from fxcrack.demos import (
     penny,
     pinch,
     shell_dcb,
+    skin_stringer_panel,
     thermal_bilayer,
     two_cracks,
 )
@@ -111,6 +112,23 @@ def test_shell_dcb_is_close_to_the_solids_with_long_cells():
     load, rate, strip = shell_dcb.beside(found, reference)
     assert abs(load) < 0.02 and abs(rate) < 0.02 and strip < 0.02  # the required 2 %
     assert found["unknowns"] < 0.25 * reference["unknowns"]
+
+
+@pytest.mark.slow
+def test_skin_stringer_panel_buckles_and_comes_off():
+    """Flat, it has the stiffness of its laminates; then it buckles, and the debond grows."""
+    demo = skin_stringer_panel
+    scene, _ = demo.run(demo.Cells(order=1, along=8.0, foot=3, bay=5), until=0.4)
+    history = scene.history
+    flat = [
+        -demo.at(history, "R[end.x]", t) / demo.flat_load(demo.SHORTENING * t) for t in (0.15, 0.4)
+    ]
+    assert flat[0] == pytest.approx(1.0, abs=5e-3)  # what is held at the end adds 0.06 %
+    assert flat[1] < 0.9
+    area = history["area[bond]"].astype(float)
+    assert demo.at(history, "area[bond]", 0.15) == pytest.approx(area[0])
+    assert area[-1] > 1.1 * area[0]
+    scene.close()
 
 
 def test_enhanced_dcb_spends_the_propagation_toughness():

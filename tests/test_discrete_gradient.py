@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fxcrack.equilibrium.discrete_gradient import softening_force, softening_potential
+from fxcrack.equilibrium.discrete_gradient import (
+    force_of_one,
+    softening_force,
+    softening_potential,
+)
 
 number = st.floats(0.0, 1.0)
 
@@ -64,3 +69,31 @@ def test_secant_force_is_the_mean_of_both_ends() -> None:
 def test_a_long_increment_breaks_the_bond_at_once_with_the_whole_energy() -> None:
     (force,) = softening_force(*one(2.0, 0.1, 0.0, 0.0, 5.0, 1e-3))
     assert abs(force * (5.0 - 1e-3 * force) - 0.1) <= 1e-14
+
+
+@given(
+    low=st.floats(-1.0, 1.0), top=number, change=st.floats(-2.0, 2.0), log_c=st.floats(-6.0, 3.0)
+)
+def test_one_bond_has_the_force_of_an_array(
+    low: float, top: float, change: float, log_c: float
+) -> None:
+    low, c = min(low, top), 10.0**log_c
+    (known,) = softening_force(*one(1.0, 1.0, low, top, change, c))
+    # where both roots of the quadratic coincide, round-off in it appears with its square root, 2e-8
+    assert force_of_one(1.0, 1.0, low, top, change, c) == pytest.approx(known, rel=2e-7, abs=1e-12)
+
+
+@given(
+    low=st.floats(-1.0, 1.0), top=number, change=st.floats(-2.0, 2.0), log_c=st.floats(-6.0, 3.0)
+)
+def test_work_of_one_bond_is_the_change_of_the_potential(
+    low: float, top: float, change: float, log_c: float
+) -> None:
+    top = max(top, 1e-3)
+    low, c = min(low, top), 10.0**log_c
+    force = force_of_one(1.0, 1.0, low, top, change, c)
+    high = low + change - c * force
+    before = softening_potential(*one(1.0, 1.0, low, top))[0]
+    after = softening_potential(*one(1.0, 1.0, high, max(top, high)))[0]
+    assert force >= 0.0
+    assert abs(force * (high - low) - (after - before)) <= 1e-10 * (1.0 + abs(change))

@@ -41,9 +41,8 @@ def beam(
         mesh or dcb_2d(comm, length=80.0, height=1.5, dx=0.5, ny=3),
         materials=ALUMINIUM,
         model=fx.PlaneStrain(thickness=20.0),
-        supports=pins(speed),
         debonds=[fx.Debond(interface, criterion or fx.VCCT(GIc=G_IC), **given)],
-        **{"effects": [fx.Inertia()], **options},
+        **{"effects": [fx.Inertia()], "supports": pins(speed), **options},
     )
 
 

@@ -207,3 +207,35 @@ def test_fields_bonds_and_explanation(tmp_path: Path) -> None:
     for word in ("explicit", "increment", "operator"):
         assert word in text, text
     scene.close()
+
+
+def test_energies_balance_where_the_increment_changes() -> None:
+    scene = beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF))
+    for n, safety in enumerate((0.9, 0.5, 0.97)):
+        history = scene.run(until(scene, 40.0, 1e-4 + 2e-5 * n, rows=10, safety=safety))
+    scene.close()
+    assert history["dt"].max() / history["dt"].min() == pytest.approx(0.97 / 0.5, rel=0.05)
+    assert abs(history["dt_energy"][-1]) > 1e-6 * history["external_work"][-1]
+    assert imbalance(history) <= 1e-10
+
+
+@pytest.mark.parametrize("nx_lower", [None, 44], ids=["matching", "not matching"])
+def test_bonds_soften_beside_friction(nx_lower: int | None) -> None:
+    """Arms pressed on each other are sheared apart: bonds soften, faces slide under pressure."""
+    scene = beam(
+        MPI.COMM_SELF, 0.0, mesh=coarse(MPI.COMM_SELF, nx_lower=nx_lower), friction=0.4,
+        release=fx.ProgressiveRelease(zone=2),
+        supports=[
+            fx.Displacement("end_upper", x=1.2e4), fx.Displacement("end_lower", x=-1.2e4),
+            fx.Displacement("bottom", y=0.0),
+        ],
+        loads=[fx.Pressure("top", 20.0, amplitude=fx.Amplitude((0.0,), (1.0,)))],
+    )  # fmt: skip
+    history = scene.run(until(scene, 36.0, 6e-5, rows=40))
+    scene.close()
+    assert history["a[bond]"][-1] >= 34.0
+    assert history["friction_energy"][-1] > 0.0
+    assert imbalance(history) <= 1e-10
+    # softening, contact and friction are found together, so bonds spend exactly their toughness;
+    # shared masters are solved in sweeps
+    assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=2e-6)

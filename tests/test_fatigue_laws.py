@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import quad
 from scipy.interpolate import CubicSpline
 from specimens import (
+    GROWS,
     HALF_OPENING,
     PARIS,
     bond,
@@ -22,6 +23,7 @@ from specimens import (
 
 import fxcrack as fx
 from fxcrack.criteria import Regime, element_cycles
+from fxcrack.demos import thermal_bilayer
 from fxcrack.demos.mmb import ARMS, CRITERION, HALF_SPAN
 from fxcrack.meshes.mmb import mmb_2d
 
@@ -246,3 +248,28 @@ def test_bad_laws_are_named(make: Any, says: str) -> None:
 def test_laws_of_the_user_are_checked(law: Any, says: str) -> None:
     with pytest.raises(fx.InputError, match=says):
         fx.Fatigue(GIc=1.0, growth=law).growth_law.growth(CYCLE)
+
+
+@pytest.mark.verification
+def test_temperature_cycles_grow_a_bilayer() -> None:
+    """Cooling by 200 and by 50 in turn: G goes with the square, steady state in closed form."""
+    growth = fx.Paris(0.0, -1.0, 1e-2, 3.0, 0.0, 0.99)
+    scene = fx.Scene(
+        thermal_bilayer.layers(0.5),
+        materials={"upper": thermal_bilayer.UPPER, "lower": thermal_bilayer.LOWER},
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("middle_upper", x=0.0),
+            fx.Displacement("middle_lower", x=0.0),
+            fx.Displacement("foot", y=0.0),
+        ],
+        debonds=[fx.Debond(bond(4.0), fx.Fatigue(GIc=10.0, paris=growth, method="closure"))],
+        effects=[fx.Temperature(-1.0)],
+    )
+    history = scene.run(fx.Cycles(maximum=200.0, minimum=50.0, until=until_length(scene, 7.0)))
+    rows = [r for r in history if r["event"] in GROWS]
+    top, dG = (np.array([r[k] for r in rows]) for k in ("G_max[bond]", "dG[bond]"))
+    np.testing.assert_allclose(dG, (1.0 - 0.25**2) * top, rtol=1e-9)
+    # the energy of whole elements, far from both ends, on two elements per layer
+    np.testing.assert_allclose(top, thermal_bilayer.steady_rate(200.0), rtol=0.03)
+    scene.close()

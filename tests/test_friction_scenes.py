@@ -75,14 +75,16 @@ def test_a_function_gives_the_coefficient_and_is_checked(comm: MPI.Intracomm) ->
 
 def test_progressive_release_beside_friction_is_refused(comm: MPI.Intracomm) -> None:
     bond = fx.Interface("upper_face", "lower_face", lambda x: x[0] > 1.0, True, 0.3)
+    scene = fx.Scene(
+        dcb_2d(comm, length=4.0, height=1.0, dx=0.5, ny=2),
+        materials=fx.Isotropic(1000.0, 0.3),
+        model=fx.PlaneStrain(),
+        supports=[fx.Displacement("bottom", x=0.0, y=0.0)],
+        debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())],
+    )
     with pytest.raises(InputError, match="not possible beside friction"):
-        fx.Scene(
-            dcb_2d(comm, length=4.0, height=1.0, dx=0.5, ny=2),
-            materials=fx.Isotropic(1000.0, 0.3),
-            model=fx.PlaneStrain(),
-            supports=[fx.Displacement("bottom", x=0.0, y=0.0)],
-            debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())],
-        )
+        scene.run(fx.Static(until=fx.Releases(1)))
+    scene.close()
 
 
 # -- blocks --------------------------------------------------------------------------------

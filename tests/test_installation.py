@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import os
 import resource
+import shutil
 import subprocess
 import sys
+import tarfile
 import tomllib
+import venv
 from pathlib import Path
 
 import fxcrack_command
@@ -131,3 +134,61 @@ def test_outputs_that_cannot_be_written_are_refused_beforehand(tmp_path: Path) -
         check_writable("--out", tmp_path / "file", folder=True)
     with pytest.raises(InputError, match=r"--json '.*' cannot be written: "):
         check_writable("--json", tmp_path / "file" / "a.json")
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not (ROOT / "fxcrack").is_dir(), reason="the sources are not here")
+def test_distributions_are_whole(tmp_path: Path) -> None:
+    """A wheel made from the source distribution alone, in a new environment, grows a crack."""
+    pytest.importorskip("setuptools.build_meta")
+    sources = tmp_path / "sources"
+    shutil.copytree(
+        ROOT, sources, ignore=shutil.ignore_patterns(".*", "out", "build", "*.egg-info")
+    )
+
+    def build(what: str, folder: Path) -> Path:
+        program = f"from setuptools import build_meta as b; print(b.{what}({str(tmp_path)!r}))"
+        done = subprocess.run(
+            [sys.executable, "-c", program], cwd=folder, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, done.stderr
+        return tmp_path / done.stdout.splitlines()[-1]
+
+    sdist = build("build_sdist", sources)
+    with tarfile.open(sdist) as archive:
+        archive.extractall(tmp_path / "unpacked", filter="data")
+    wheel = build("build_wheel", next((tmp_path / "unpacked").iterdir()))
+    fresh = tmp_path / "fresh"
+    venv.create(fresh, with_pip=True)
+    subprocess.run(
+        [fresh / "bin/pip", "install", "-q", "--no-index", "--no-deps", wheel],
+        check=True,
+        capture_output=True,
+    )
+    # The libraries are those of this environment; its own .pth files, one of which would lead to
+    # the sources here, are not read.
+    packages = next((fresh / "lib").glob("python*/site-packages"))
+    (packages / "libraries.pth").write_text(
+        "\n".join(p for p in sys.path if p.endswith("packages"))
+    )
+    for library in Path(sys.prefix, "lib").iterdir():  # where mpi4py looks for MPI
+        if not (fresh / "lib" / library.name).exists():
+            (fresh / "lib" / library.name).symlink_to(library)
+    program = (
+        "import fxcrack as fx, fxcrack.demos.dcb\n"
+        "print(fx.__file__)\n"
+        "import pathlib; fxcrack.demos.dcb.main(pathlib.Path('out'))\n"
+    )
+    done = subprocess.run(
+        [fresh / "bin/python", "-c", program],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert str(fresh) in done.stdout.splitlines()[0]
+    named = subprocess.run(
+        [fresh / "bin/fxcrack", "--version"], capture_output=True, text=True, check=True
+    )
+    assert fxcrack.__version__ in named.stdout

@@ -90,7 +90,9 @@ def test_rows_of_masters_are_blocks(comm: MPI.Intracomm, case: str) -> None:
         held = [fx.Displacement("a_bottom", x=0.0, y=0.5)]
     continuum = Continuum(mesh, STEEL, fx.Solid() if solid else fx.PlaneStrain())
     layout = continuum.layout = OffsetLayout(continuum, 6 if solid else 5)
-    pairs = [make_pair(continuum, i) for i in interfaces]
+    pairs = [
+        make_pair(continuum, i, others=[j for j in interfaces if j is not i]) for i in interfaces
+    ]
     supports = collect_supports(continuum, held)
     roles = [np.full((p.surface.n_nodes, mesh.gdim), RETAINED, dtype=np.int8) for p in pairs]
     found = build_coordinates(layout, pairs, roles, supports, 1)

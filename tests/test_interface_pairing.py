@@ -63,7 +63,9 @@ def coordinates(
     """Pairs, their coordinates with all jumps retained, and T dense."""
     model = fx.PlaneStrain() if mesh.gdim == 2 else fx.Solid()
     continuum = Continuum(mesh, STEEL, model)
-    pairs = [make_pair(continuum, i) for i in interfaces]
+    pairs = [
+        make_pair(continuum, i, others=[j for j in interfaces if j is not i]) for i in interfaces
+    ]
     roles = [np.full((p.surface.n_nodes, mesh.gdim), RETAINED, dtype=np.int8) for p in pairs]
     columns = collect_supports(continuum, list(supports))
     found = build_coordinates(continuum.layout, pairs, roles, columns, 0)
@@ -257,7 +259,7 @@ def test_gap(comm: MPI.Intracomm, gap: str) -> None:
     nodes = np.unique(fx.compat.geometry_dofmap(mesh.domain)[cells])
     mesh.domain.geometry.x[nodes, 1] += 0.02
     del upper
-    pair = make_pair(continuum, bond(0.0, gap=gap))
+    pair = make_pair(continuum, bond(0.0, gap=gap, pairing="surface-to-surface"))
     expected = 0.02 if gap == "keep" else 0.0
     assert pair.gap == pytest.approx(np.full(9, expected), abs=ROUND_OFF)
     assert pair.frames == pytest.approx(

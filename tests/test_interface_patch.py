@@ -1,5 +1,6 @@
 """Patch tests: a uniform stress passes a bond between meshes that do not match.
 
+Surface-to-surface bonds, the default on such meshes, pass it whatever the meshes and roles.
 Node-to-surface bonds carry slave forces to the master nodes by the masters' shape functions N_m.
 A uniform traction t gives the slave nodes t times the integrals of their own shape functions, so
 master node m gets t sum_s N_m(x_s) int N_s: right when the slave mesh integrates N_m exactly. It
@@ -100,7 +101,57 @@ def tie(**options: object) -> fx.Interface:
 def test_divided_master_facets_pass(comm: MPI.Intracomm, cell: str, order: int, load: str) -> None:
     # divided boxes make divided facets, save for linear triangles, whose diagonals differ
     n_slave = 4 if (cell, order) == ("tetrahedron", 1) else 8
-    assert error(mesh_of(comm, cell, order, n_slave, 4), load, tie()) < ROUND_OFF
+    nodes = tie(pairing="node-to-surface")
+    assert error(mesh_of(comm, cell, order, n_slave, 4), load, nodes) < ROUND_OFF
+
+
+@pytest.mark.quick("quadrilateral-2-*", "hexahedron-1-*", "tetrahedron-*-shear-3-7-*")
+@pytest.mark.parametrize("pairing", [None, "surface-to-surface"], ids=["default", "as named"])
+@pytest.mark.parametrize(("n_slave", "n_master"), [(3, 7), (7, 3)], ids=["3-7", "7-3"])
+@pytest.mark.parametrize(
+    ("cell", "order", "load"),
+    [
+        pytest.param(*case, load, marks=pytest.mark.mpi if (*case, load) in PARALLEL else ())
+        for case in CELLS
+        for load in ("tension", "shear")
+    ],
+)
+def test_any_meshes_pass_in_both_roles(
+    comm: MPI.Intracomm, cell: str, order: int, load: str, n_slave: int, n_master: int,
+    pairing: str | None,
+) -> None:  # fmt: skip
+    mesh = mesh_of(comm, cell, order, n_slave, n_master)
+    assert error(mesh, load, tie(pairing=pairing)) < ROUND_OFF
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("pairing", [None, "surface-to-surface"], ids=["default", "as named"])
+@pytest.mark.parametrize("n", [(3, 7), (7, 3)], ids=["3-7", "7-3"])
+def test_axisymmetric_bodies_pass(
+    comm: MPI.Intracomm, n: tuple[int, int], pairing: str | None
+) -> None:
+    """Two discs on each other in tension; rings of all facets carry their share of it."""
+    mesh = mesh_of(comm, "quadrilateral", 1, *n)
+    scene = fx.Scene(
+        mesh,
+        materials=fx.Isotropic(E, NU),
+        model=fx.Axisymmetric(),
+        supports=[
+            fx.Displacement("bottom", y=0.0),
+            *(fx.Displacement(f"end_{side}", x=0.0) for side in ("upper", "lower")),
+        ],
+        loads=[fx.Traction("top", (0.0, 1.0))],
+        bonds=[tie(pairing=pairing)],
+    )
+    scene.run(fx.Static(until=fx.Time(1.0)))
+    vector = scene.solver.displacement()
+    u = gathered_vector(vector).reshape(-1, 2)
+    vector.destroy()
+    n_own = scene.continuum.n_local // 2
+    x = np.concatenate(mesh.comm.allgather(scene.continuum.positions()[:n_own]))
+    exact = np.column_stack([-NU * x[:, 0], x[:, 1] + 1.0]) / E
+    scene.close()
+    assert np.abs(u - exact).max() < ROUND_OFF * np.abs(exact).max()
 
 
 @pytest.mark.parametrize(("cell", "order"), [("quadrilateral", 1), ("quadrilateral", 2)])
@@ -109,7 +160,8 @@ def test_other_roles_do_not_pass(
     cell: str, order: int, n_slave: int, n_master: int, expected: float
 ) -> None:
     """What the documentation says about them is still so: measured, within a half."""
-    found = error(mesh_of(MPI.COMM_SELF, cell, order, n_slave, n_master), "tension", tie())
+    mesh = mesh_of(MPI.COMM_SELF, cell, order, n_slave, n_master)
+    found = error(mesh, "tension", tie(pairing="node-to-surface"))
     assert expected / 1.5 < found < expected * 1.5
 
 

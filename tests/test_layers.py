@@ -11,7 +11,6 @@ import io
 import re
 import tokenize
 from collections.abc import Iterator
-from functools import cache
 from pathlib import Path
 
 import pytest
@@ -34,6 +33,8 @@ ORDER = (
 ON_USE = {
     "mesh.read -> gmsh": "only a gmsh model or file needs it, and it loads a large library",
     "history -> output.plots": "matplotlib is loaded by those who plot; the one arrow upwards",
+    "history -> pandas": "an optional library that only to_frame needs",
+    "scene -> output.report": "it loads Jinja2, an optional library, and matplotlib",
     "accuracy.scenes -> demos": "a study loads its own demo alone; one of them loads matplotlib",
     "command -> cli": "it answers --help and --version without DOLFINx",
     "cli": "its help does not wait for the libraries of its commands",
@@ -44,9 +45,13 @@ LEVELS = 2
 """Classes of this package above a class."""
 
 
-@cache
+@pytest.fixture(scope="module")
 def modules() -> dict[str, ast.Module]:
-    """Syntax trees of the package's modules by their names without "fxcrack."."""
+    """Syntax trees of the package's modules by their names without "fxcrack.".
+
+    Freed after these tests: millions of objects would make each later garbage collection take
+    most of a second.
+    """
     found = {}
     for path in sorted((ROOT / "fxcrack").rglob("*.py")):
         words = path.relative_to(ROOT / "fxcrack").with_suffix("").parts
@@ -70,9 +75,9 @@ def imports(tree: ast.AST) -> Iterator[str]:
             yield "public names" if name == "fxcrack" else name.removeprefix("fxcrack.")
 
 
-def test_no_import_runs_upwards() -> None:
+def test_no_import_runs_upwards(modules: dict[str, ast.Module]) -> None:
     found = set()
-    for name, tree in modules().items():
+    for name, tree in modules.items():
         for wanted in imports(tree):
             here, there = name.partition(".")[0], wanted.partition(".")[0]
             arrow = f"{name} -> {wanted}"
@@ -81,19 +86,19 @@ def test_no_import_runs_upwards() -> None:
     assert sorted(found) == []
 
 
-def test_no_import_inside_a_function() -> None:
+def test_no_import_inside_a_function(modules: dict[str, ast.Module]) -> None:
     found = set()
-    for name, tree in modules().items():
+    for name, tree in modules.items():
         functions = (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef))
         found |= {f"{name} -> {wanted}" for f in functions for wanted in imports(f)}
     assert all(any(arrow.startswith(known) for arrow in found) for known in ON_USE)
     assert sorted(a for a in found if not a.startswith(tuple(ON_USE))) == []
 
 
-def test_inheritance_is_flat() -> None:
+def test_inheritance_is_flat(modules: dict[str, ast.Module]) -> None:
     bases = {
         node.name: [ast.unparse(b).partition("[")[0].split(".")[-1] for b in node.bases]
-        for tree in modules().values()
+        for tree in modules.values()
         for node in ast.walk(tree)
         if isinstance(node, ast.ClassDef)
     }

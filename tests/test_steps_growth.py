@@ -314,7 +314,7 @@ def refactored(scene: fx.Scene, count: int) -> tuple[list[int], Array]:
         for s in slaves:
             for m, w in zip(pair.masters[s], pair.weights[s], strict=True):
                 for c in range(2):
-                    follow[2 * pair.surface.dofs[s] + c, 2 * m + c] = w
+                    follow[2 * pair.surface.dofs[s] + c, 2 * m + c] += w
         t = follow.tocsc()
         u = t @ value
         t = t[:, free]

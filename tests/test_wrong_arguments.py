@@ -145,7 +145,10 @@ CALLS: list[Call] = [
         },
     ),
     (fx.EnhancedVCCT, {"GIc": 0.2, "GIc_p": 0.3}),
-    (fx.Fatigue, {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False}),
+    (
+        fx.Fatigue,
+        {"GIc": 0.2, "paris": fx.Paris(1.0, -2.0, 1.0, 1.0), "credit": False, "partial": True},
+    ),
     (
         fx.Paris,
         {

@@ -35,6 +35,18 @@ def show_speed(result: Result, console: Console) -> None:
         console.print(_baselines(result))
 
 
+def show_explicit(results: list[Result], console: Console) -> None:
+    """Print results of :func:`fxcrack.bench.explicit.run`."""
+    table = new_table(
+        "explicit dynamics, ms of processor time per increment",
+        *("dofs", "ranks", "operator", "increment", results[0]["once"], "ratio", "difference"),
+    )
+    for r in results:
+        numbers = [f"{r[k]:.3f}" for k in ("ms_per_increment", "ms_once", "ratio", "ms_beside")]
+        table.add_row(str(r["dofs"]), str(r["ranks"]), r["operator"], *numbers)
+    console.print(table)
+
+
 def _summary(result: Result) -> Table:
     size = ", ".join(f"{k} {result[k]:g}" for k in ("dx", "dy", "ny") if k in result)
     table = new_table(f"{result['problem']} ({size})", "", "")

@@ -23,8 +23,9 @@ from fxcrack.condensation.bordered_matrix import BorderedMatrix
 from fxcrack.condensation.mumps_schur import (
     TOO_SMALL,
     WORKSPACE,
+    Doubt,
     SchurFactor,
-    factor_problem,
+    check_factor,
     library,
     mumps_message,
 )
@@ -46,6 +47,7 @@ class DirectCondensation:
         method: "schur" takes S out of MUMPS, "columns" builds it by block solves, "auto" takes
             the first where it can.
         definite: Whether the inner block must be positive definite.
+        doubt: What to ask where pivots may be round-off, see :class:`SchurFactor`.
         renewable: Whether :meth:`renew` is called later on; memory for that is kept then.
 
     Attributes:
@@ -64,6 +66,7 @@ class DirectCondensation:
         *,
         method: str = "auto",
         definite: bool = True,
+        doubt: Doubt | None = None,
         renewable: bool = False,
     ) -> None:
         if method not in ("auto", "schur", "columns"):
@@ -71,7 +74,7 @@ class DirectCondensation:
         self.coordinates = coordinates
         self.timings = timings
         self.n_negative = 0
-        self._definite = definite
+        self._definite, self._doubt = definite, doubt
         self._comm = compat.plain_comm(stiffness.getComm().tompi4py())
         self._factor: SchurFactor | None = None
         self._inner: PETSc.KSP | None = None
@@ -121,8 +124,9 @@ class DirectCondensation:
     def _factorise(self, gdim: int) -> None:
         if self._factor is None:
             self._factor = SchurFactor(
-                self.matrix, self.coordinates.n_last, gdim=gdim, definite=self._definite
-            )
+                self.matrix, self.coordinates.n_last, gdim=gdim, definite=self._definite,
+                doubt=self._doubt,
+            )  # fmt: skip
         else:
             self._factor.renew(self.matrix)
 
@@ -205,17 +209,20 @@ class DirectCondensation:
             factor = solver.getPC().getFactorMatrix()
             factor.setMumpsIcntl(14, extra)
             solver.setUp()
-            problem = factor_problem(
-                factor.getMumpsInfog, factor.getMumpsRinfog, definite=self._definite
-            )
-            if problem is None:
-                self.n_negative = factor.getMumpsInfog(12)
-                return solver
-            enough = factor.getMumpsInfog(1) not in TOO_SMALL
-            solver.destroy()
-            if enough:
+            code = factor.getMumpsInfog(1)
+            if code not in TOO_SMALL or extra == WORKSPACE[-1]:
                 break
-        raise SolverError(problem)
+            solver.destroy()
+        try:
+            check_factor(
+                factor.getMumpsInfog, factor.getMumpsRinfog, definite=self._definite,
+                doubt=self._doubt,
+            )  # fmt: skip
+        except SolverError:
+            solver.destroy()
+            raise
+        self.n_negative = factor.getMumpsInfog(12)
+        return solver
 
     def _columns(self, block_size: int = 64) -> Array:
         """S by solves with blocks of right-hand sides: same result, slower."""

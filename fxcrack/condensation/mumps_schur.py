@@ -22,13 +22,22 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.errors import SolverError
 
 _FACTOR_CHOLESKY = 2
-_SMALLEST_PIVOT = 1e-11
+_SMALLEST_PIVOT = 1e-10
 _ICNTL_ORDERING, _ICNTL_MEMORY, _ICNTL_REDUCED = 7, 14, 26
 _AMD, _AUTOMATIC = 0, 7
 WORKSPACE = (40, 200, 1000)
 """Per cent added to MUMPS' estimate of its workspace, one after the other until it is enough."""
 TOO_SMALL = (-8, -9, -11, -14, -15, -17, -20)
 """INFOG(1) that more workspace may cure."""
+SINGULAR = (-10, -40)
+"""INFOG(1) of a matrix that is singular to MUMPS."""
+HELD_BY_ROUND_OFF = (
+    "all bodies are held, but some so much more weakly than the stiffest is stiff that round-off "
+    "is all that is left; bring moduli or thicknesses nearer together"
+)
+"""Why a pivot counts as zero in bodies that are held."""
+Doubt = Callable[[float], None]
+"""What is asked where pivots may be round-off, see :class:`SchurFactor`."""
 
 
 def library() -> ctypes.CDLL | None:
@@ -67,6 +76,9 @@ class SchurFactor:
         gdim: Dimension of the bodies, which decides the ordering.
         definite: Whether the leading block must be positive definite; a tangent on the way to an
             equilibrium need not be.
+        doubt: Called on all ranks with the smallest pivot over the largest where that may be
+            round-off, 0 where it has the wrong sign; raises if the factor must not be used. By
+            default such a factor is refused where the block must be positive definite.
 
     Attributes:
         schur: S, shape (n_last, n_last), the same array on every rank.
@@ -77,7 +89,13 @@ class SchurFactor:
     """
 
     def __init__(
-        self, matrix: PETSc.Mat, n_last: int, *, gdim: int = 3, definite: bool = True
+        self,
+        matrix: PETSc.Mat,
+        n_last: int,
+        *,
+        gdim: int = 3,
+        definite: bool = True,
+        doubt: Doubt | None = None,
     ) -> None:
         lib = library()
         if lib is None:
@@ -92,7 +110,7 @@ class SchurFactor:
         self._comm = compat.plain_comm(matrix.getComm().tompi4py())
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, definite)
-        self._n_last, self._definite = n_last, definite
+        self._n_last, self._definite, self._doubt = n_last, definite, doubt
         self._from_scratch(matrix)
 
     def renew(self, matrix: PETSc.Mat) -> None:
@@ -120,11 +138,12 @@ class SchurFactor:
 
     def _take(self) -> None:
         """Take S and the signs of the pivots out of a new factor."""
-        problem = factor_problem(self._infog, self._rinfog, definite=self._definite)
         self.n_negative = self._infog(12)
-        if problem:
+        try:
+            check_factor(self._infog, self._rinfog, definite=self._definite, doubt=self._doubt)
+        except SolverError:
             self.destroy()
-            raise SolverError(problem)
+            raise
         self.schur = self._fetch(self._n_last)
 
     def _factorise(self, matrix: PETSc.Mat, rows: PETSc.IS, extra: int) -> None:
@@ -206,31 +225,46 @@ def mirror_lower(square: Array) -> None:
         square[i : i + step, i + step :] = square[i + step :, i : i + step].T
 
 
-def factor_problem(
-    infog: Callable[[int], int], rinfog: Callable[[int], float], *, definite: bool = True
-) -> str | None:
-    """Why a factor of a stiffness matrix must not be used, ``None`` if it may.
+def check_factor(
+    infog: Callable[[int], int],
+    rinfog: Callable[[int], float],
+    *,
+    definite: bool = True,
+    doubt: Doubt | None = None,
+) -> None:
+    """Refuse a factor of a stiffness matrix that must not be used; collective.
 
     MUMPS reports no error for a body held by nothing: round-off leaves it a last pivot of either
-    sign, below 1e-10 of the largest in the cases tried. Sound models had more than 1e-9, up to
-    slenderness 8000.
+    sign, below 1e-10 of the largest in the cases tried. So small are those of some bodies that are
+    held as well, thin ones or soft ones beside stiff ones: pivots raise the question only.
 
     Args:
         infog: MUMPS' INFOG by number.
         rinfog: MUMPS' RINFOG by number.
         definite: Whether negative pivots are a fault.
+        doubt: See :class:`SchurFactor`.
+
+    Raises:
+        SolverError: It must not be used; the message says why.
     """
-    if infog(1) < 0:
-        return mumps_message(infog(1), infog(2))
-    n_negative, smallest, largest = infog(12), rinfog(19), rinfog(21)  # pivots; 0 if not told
-    if definite and (n_negative > 0 or smallest < _SMALLEST_PIVOT * largest):
-        return mumps_message(-10, 0)
-    return None
+    code = infog(1)
+    if code < 0 and code not in SINGULAR:
+        raise SolverError(mumps_message(code, infog(2)))
+    ratio = 0.0
+    if code >= 0 and not (definite and infog(12) > 0):
+        smallest, largest = rinfog(19), rinfog(21)  # pivots; 0 if not told
+        if smallest >= _SMALLEST_PIVOT * largest:
+            return
+        ratio = smallest / largest
+    if doubt is not None:
+        doubt(ratio)
+    if code < 0 or (doubt is None and definite):
+        raise SolverError(mumps_message(-10, 0))
 
 
 def mumps_message(code: int, detail: int) -> str:
     """What a negative INFOG(1) of MUMPS means, in words."""
-    if code in (-10, -40):
+    if code in SINGULAR:
         return (
             "the stiffness matrix is singular: some body or part of one can still move freely; "
             "hold it by supports, or bond it to something held"

@@ -1,20 +1,24 @@
 """Whether the supports hold the bodies against moving as one rigid whole.
 
 The rigid motions of the model, restricted to the supported displacement components, must be
-linearly independent: the smallest eigenvalue of their Gram matrix must not vanish. The check
-needs no factorisation and does not depend on what a direct solver notices.
+linearly independent: their smallest singular value must not vanish. The check needs no
+factorisation and does not depend on what a direct solver notices. Whether each body is held, by
+supports and bonds, is answered by :mod:`fxcrack.condensation.free_bodies`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import SolverError
 from fxcrack.condensation.mumps_schur import mumps_message
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.interface.supports import Supports
+
+_UNSEEN = 1e-8
+"""A motion is free of which the supports see no more than this part of what they see of others."""
 
 
 def rigid_motions(continuum: Continuum) -> Array:
@@ -24,7 +28,27 @@ def rigid_motions(continuum: Continuum) -> Array:
     low = continuum.comm.allreduce(x.min(axis=0, initial=np.inf), op=_least)
     high = continuum.comm.allreduce(x.max(axis=0, initial=-np.inf), op=_most)
     size = max(float((high - low).max()), 1e-300)
-    s = (x - 0.5 * (low + high)) / size
+    one = np.zeros(len(x), dtype=np.int64)
+    return motions_of(continuum, one, 0.5 * (low + high)[None], np.array([size]))
+
+
+def motions_of(continuum: Continuum, body: Ints, centre: Array, size: Array) -> Array:
+    """Rigid motions of bodies on the owned dofs, each about its centre and scaled by its size.
+
+    Args:
+        continuum: The bodies.
+        body: Number of the body of each owned node (further nodes are ignored), shape (n,).
+        centre: Centre of each body, shape (n_bodies, gdim), length.
+        size: Size of each body, shape (n_bodies,), length.
+
+    Returns:
+        Shape (n_local, n_motions); translations move by 1, rotations by 1 at a distance of the
+        size.
+    """
+    gdim, layout = continuum.gdim, continuum.layout
+    body = body[: layout.n_owned]
+    x = continuum.positions()[: layout.n_owned, :gdim]
+    s = (x - centre[body]) / size[body][:, None]
     motions, still = [], np.zeros(3)
     if isinstance(continuum.model, Axisymmetric):
         motions.append(layout.rigid_motion(np.tile([0.0, 1.0], (len(s), 1)), still))
@@ -35,7 +59,7 @@ def rigid_motions(continuum: Continuum) -> Array:
             turn = np.zeros((len(s), gdim))
             turn[:, i], turn[:, j] = -s[:, j], s[:, i]
             axis = np.cross(np.eye(3)[i], np.eye(3)[j])
-            motions.append(layout.rigid_motion(turn, axis / size))
+            motions.append(layout.rigid_motion(turn, axis / size[body][:, None]))
     return np.stack(motions, axis=1)
 
 
@@ -46,14 +70,15 @@ def check_held(continuum: Continuum, supports: Supports) -> None:
         SolverError: It can.
     """
     held = rigid_motions(continuum)[supports.which >= 0]
-    gram = continuum.comm.allreduce(held.T @ held)
-    eigenvalues, vectors = np.linalg.eigh(gram)
-    free = vectors[:, eigenvalues <= 1e-12 * max(float(eigenvalues[-1]), 1e-300)]
+    triangles = continuum.comm.allgather(np.linalg.qr(held, mode="r"))
+    none = np.zeros((held.shape[1],) * 2)
+    _, seen, vectors = np.linalg.svd(np.vstack([none, *triangles]), full_matrices=False)
+    free = vectors[seen <= _UNSEEN * max(float(seen[0]), 1e-300)].T
     if free.shape[1]:
-        raise SolverError(f"{mumps_message(-10, 0)} (the supports leave the whole {_ways(free)})")
+        raise SolverError(f"{mumps_message(-10, 0)} (the supports leave the whole {ways(free)})")
 
 
-def _ways(free: Array) -> str:
+def ways(free: Array) -> str:
     """What motions that nothing holds do, in words.
 
     Args:

@@ -41,26 +41,26 @@ def cell_vector(space: fem.FunctionSpace, parts: list[tuple[Ints, Array]]) -> PE
             (n_cells, n) with all unknowns of each node in turn.
     """
     vector = compat.create_vector(space)
-    add_to_vector(vector, space, parts)
+    with vector.localForm() as local:
+        for nodes, values in parts:
+            add_forces(local.array, nodes, values)
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
 
 
-def add_to_vector(
-    vector: PETSc.Vec, space: fem.FunctionSpace, parts: list[tuple[Ints, Array]]
-) -> None:
-    """Add vectors of cells to a ghosted vector, ghosts too; the caller updates the owners.
+def add_forces(forces: Array, nodes: Ints, values: Array) -> None:
+    """Add vectors of cells to values of the local dofs, ghosts too; the caller sums up over ranks.
 
     Args:
-        vector: From :func:`fxcrack.base.compat.create_vector`.
-        space: Space of the unknowns.
-        parts: As in :func:`cell_vector`.
+        forces: Shape (n_dofs,), changed in place.
+        nodes: Local nodes of the cells, shape (n_cells, n_nodes).
+        values: Shape (n_cells, n) with all unknowns of each node in turn.
     """
-    width = space.dofmap.index_map_bs
-    with vector.localForm() as local:
-        by_node = local.array.reshape(-1, width)
-        for nodes, values in parts:
-            np.add.at(by_node, nodes, values.reshape(*nodes.shape, width))
+    if not len(nodes):
+        return
+    width = values.size // nodes.size
+    place = (width * nodes[..., None] + np.arange(width)).ravel()
+    forces += np.bincount(place, values.ravel(), minlength=len(forces))
 
 
-__all__ = ["add_matrices", "add_to_vector", "cell_pattern", "cell_vector"]
+__all__ = ["add_forces", "add_matrices", "cell_pattern", "cell_vector"]

@@ -26,6 +26,7 @@ from fxcrack.base import collective_garbage
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import whole
 from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.continuum.cell_assembly import add_matrices, cell_pattern
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.face import Face
@@ -39,6 +40,7 @@ from fxcrack.continuum.temperature_field import (
     interpolate_given,
     interpolated,
 )
+from fxcrack.continuum.tied_cells import TiedCells
 from fxcrack.mesh import Mesh
 
 Ints = npt.NDArray[np.int32]
@@ -64,6 +66,7 @@ class Continuum:
         part_materials: The material of each part.
         part_cells: Owned cells of each part.
         shell_cells: Cells of the parts that are continuum shells, by number of the part.
+        tied_cells: Of those, the parts of first order: no UFL form of ``parts`` has their strains.
         temperature: The temperature on this mesh, ``None`` where there is none.
 
     Raises:
@@ -129,8 +132,10 @@ class Continuum:
         self.part_materials: list[Material] = []
         self.part_cells: list[Ints] = []
         self.shell_cells: dict[int, ShellCells] = {}
+        self.tied_cells: dict[int, TiedCells] = {}
         self.parts = self._assign(materials)
         self._form: Any = None
+        self._pattern: Any = None
 
     def check_material(self, material: Any) -> None:
         """Refuse what is no material of these bodies.
@@ -183,8 +188,10 @@ class Continuum:
             found = np.full(len(cells), 3 * i, dtype=np.int32)
             if isinstance(material, ContinuumShell):
                 self._check_shell(names[i])
-                shell = ShellCells(self.mesh, cells, material, names[i])
+                shell = ShellCells(self.mesh, cells, material, names[i], self.order)
                 self.shell_cells[i] = shell
+                if self.order == 1:
+                    self.tied_cells[i] = TiedCells(self.space, shell)
                 found += shell.stacking.axis.astype(np.int32)
             marks.append(found)
             counts = self.comm.allreduce(np.bincount(found - 3 * i, minlength=3))
@@ -237,10 +244,10 @@ class Continuum:
                 f"ContinuumShell of '{name}': it needs a mesh of hexahedra, in 3-D, and "
                 f"mesh '{self.mesh.name}' is plane; give a solid material"
             )
-        if self.order != 2:
+        if self.order == 1 and self.temperature is not None:
             raise InputError(
-                f"ContinuumShell of '{name}': its displacement is of second order (27 nodes); give "
-                "Scene(order=2), or mesh with second-order cells where the shell is curved"
+                f"ContinuumShell of '{name}': first-order continuum shells have no temperature; "
+                "give Scene(order=2)"
             )
 
     def _moduli(self, i: int) -> tuple[Any, Any]:
@@ -269,17 +276,29 @@ class Continuum:
 
     def compile(self) -> None:
         """Compile the stiffness form (cached on disk by DOLFINx); assembly does it otherwise."""
-        if self._form is None:
+        others = [p for i, p in enumerate(self.parts) if i not in self.tied_cells]
+        if self.tied_cells and self._pattern is None:
+            self._pattern = cell_pattern(self.space)
+        if self._form is None and others:
             u, v = ufl.TrialFunction(self.space), ufl.TestFunction(self.space)
             eu, ev = self.model.strain(u, self.x), self.model.strain(v, self.x)
             self._form = fem.form(
-                sum(ufl.inner(ufl.dot(c, eu), ev) * self.weight * dx for c, _, dx in self.parts)
+                sum(ufl.inner(ufl.dot(c, eu), ev) * self.weight * dx for c, _, dx in others)
             )
 
     def stiffness(self) -> PETSc.Mat:
         """Assemble K, shape (n_global, n_global); the caller destroys it."""
         self.compile()
-        matrix = dolfinx.fem.petsc.assemble_matrix(self._form)
+        if not self.tied_cells:
+            matrix = dolfinx.fem.petsc.assemble_matrix(self._form)
+            matrix.assemble()
+            return matrix
+        matrix = dolfinx.fem.petsc.create_matrix(self._pattern)
+        matrix.zeroEntries()
+        if self._form is not None:
+            dolfinx.fem.petsc.assemble_matrix(matrix, self._form)
+        for part in self.tied_cells.values():
+            add_matrices(matrix, part.nodes, part.strain_cells.stiffness())
         matrix.assemble()
         return matrix
 

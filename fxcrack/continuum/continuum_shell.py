@@ -21,14 +21,16 @@ Axis = tuple[float, float, float] | Callable[[Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class ContinuumShell:
-    """Material of thin hexahedra of second order, one or more across the thickness.
+    """Material of thin hexahedra, one or more across the thickness.
 
-    The cells are integrated so that they may be thin and curved without locking
-    (:mod:`fxcrack.continuum.reduced_integration`), for small strain and for
-    :class:`fxcrack.FiniteStrain`. Any number of plies may lie in one cell: the stiffness over the
-    thickness is the polynomial with the moments of the plies. The faces of the cells are ordinary
-    faces: interfaces, loads and supports take them by name. Displacements are of second order
-    (27 nodes); a mesh of first order needs ``Scene(order=2)``.
+    The cells may be thin and curved without locking, for small strain and for
+    :class:`fxcrack.FiniteStrain`. Of second order (27 nodes) they are integrated with reduced
+    points (:mod:`fxcrack.continuum.reduced_integration`), of first order (8 nodes) their strains
+    are tied and enhanced (:mod:`fxcrack.continuum.tied_cells`): as with solids the order is that of
+    the mesh, or ``Scene(order=...)``. Take second order where accuracy counts, first order in
+    explicit dynamics, which has no other, and with much contact. Any number of plies may lie in
+    one cell: the stiffness over the thickness is the polynomial with the moments of the plies. The
+    faces of the cells are ordinary faces: interfaces, loads and supports take them by name.
 
     Args:
         section: A laminate over the whole thickness, or one material.

@@ -120,7 +120,8 @@ class DofLayout:
 
         Args:
             displacement: That of the nodes, shape (n_owned, gdim).
-            rotation: Vector of the rotation, shape (3,), in the units of displacement per length.
+            rotation: Vector of the rotation, the same everywhere or one per node, shape (3,) or
+                (n_owned, 3), in the units of displacement per length.
 
         Returns:
             Shape (n_local,).

@@ -161,6 +161,12 @@ class InertiaForces(Term):
     def __init__(self, continuum: Continuum, effect: Inertia) -> None:
         if effect.lumped and continuum.order != 1:
             raise InputError("Inertia: lumped mass exists for first-order bodies only (order=1)")
+        if effect.rayleigh[1] and continuum.tied_cells:
+            raise InputError(
+                f"Inertia: rayleigh = {effect.rayleigh}: damping by stiffness is not available "
+                "with first-order continuum shells; use damping by mass, rayleigh=(r, 0.0), or "
+                "Scene(order=2)"
+            )
         self._continuum = continuum
         self._effect = effect
         domain = continuum.mesh.domain
@@ -270,6 +276,14 @@ class InertiaForces(Term):
         v = last["v"] + dt * ((1.0 - gamma) * last["a"] + gamma * a)
         self._c_known.x.array[:] = v + alpha_f * (last["v"] - last["c"]) / keep
         self._w[:] = 0.0
+
+    def expect(self, dt: float) -> None:
+        """Have the tangent of increments of a length before the first one begins.
+
+        Args:
+            dt: The length, time.
+        """
+        self._take_dt(dt)
 
     def _take_dt(self, dt: float) -> None:
         """Set b_u and c_u for increments of a length; 0 before the first one."""

@@ -25,6 +25,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kernels import fast_form
 from fxcrack.continuum.term import Term
 
+_NO_FORM = object()
 _TRIALS = 5
 """Evaluations of which the fastest counts when operators are compared."""
 
@@ -91,6 +92,7 @@ class InternalForces:
         self.linear = all(t.constant for t in terms) and continuum.temperature is None
         self.evaluations = 0
         self.choice = OperatorChoice("assembly", "nothing else was chosen", {})
+        self._by_cells = [t for t in terms if t.by_cells]
         self._changing = [t for t in terms if not t.constant and _has_state(t)]
         self._form: Any = None
         self._energies: dict[str, Any] = {}
@@ -144,19 +146,27 @@ class InternalForces:
             matrix.destroy()
         return self._matrix
 
+    def forget_stiffness(self) -> None:
+        """Free the memory of :meth:`stiffness`, which is assembled again where it is needed."""
+        self._matrix = None
+
     def _product(self) -> Array:
         return np.asarray(self.stiffness() @ self.u.x.array)
 
     def _compile(self) -> None:
         if self._form is None:
             v, comm = ufl.TestFunction(self.continuum.space), self.continuum.comm
-            self._form = fast_form(comm, sum(t.residual(self.u, v) for t in self.terms))
+            forms = [t.residual(self.u, v) for t in self.terms if not t.by_cells]
+            self._form = fast_form(comm, sum(forms)) if forms else _NO_FORM
 
     def _assembled(self) -> Array:
         self._compile()
         values = self._vector.x.array
         values[:] = 0.0
-        fem.assemble_vector(values, self._form)
+        if self._form is not _NO_FORM:
+            fem.assemble_vector(values, self._form)
+        for term in self._by_cells:
+            term.add_residual(values, self.u)
         if self.continuum.comm.size > 1:
             self._vector.x.scatter_reverse(dolfinx.la.InsertMode.add)
         return np.asarray(values[: self.continuum.n_local])
@@ -216,9 +226,11 @@ class InternalForces:
         """Energy stored at :attr:`u`, force times length; collective."""
         if not self._energies:
             comm = self.continuum.comm
-            total = [e for e in (t.energy(self.u) for t in self.terms) if e is not None]
+            forms = [t.energy(self.u) for t in self.terms if not t.by_cells]
+            total = [e for e in forms if e is not None]
             self._energies = {"stored": fast_form(comm, sum(total))} if total else {}
         value = sum(fem.assemble_scalar(form) for form in self._energies.values())
+        value += sum(term.stored(self.u) for term in self._by_cells)
         return float(self.continuum.comm.allreduce(value, op=MPI.SUM))
 
 

@@ -17,7 +17,8 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import InputError
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import (
     BodyForce,
@@ -134,7 +135,7 @@ def _vector(continuum: Continuum, value: tuple[Field, ...], title: str) -> Any:
 
 
 def _point_force(
-    continuum: Continuum, where: str, value: tuple[float, ...], title: str
+    continuum: Continuum, where: str, value: tuple[Field, ...], title: str
 ) -> PETSc.Vec:
     _check_components(continuum, value, title)
     layout = continuum.layout
@@ -142,5 +143,16 @@ def _point_force(
     count = continuum.comm.allreduce(len(nodes))
     vector = PETSc.Vec().createMPI((layout.n_local, layout.n_global), comm=continuum.comm)
     for i, component in enumerate(value):
-        vector.array[layout.dof(nodes, i)] = component / count
+        found: Array | float = 0.0
+        problem = None
+        try:
+            if callable(component):
+                x = continuum.positions()[nodes]
+                found = numbers_at(f"load '{title}'", f"value[{i}]", component, x)
+            else:
+                found = float(component)
+        except InputError as error:  # on this rank, perhaps
+            problem = str(error)
+        raise_on_all_ranks(continuum.comm, problem)
+        vector.array[layout.dof(nodes, i)] = found / count
     return vector

@@ -215,17 +215,18 @@ class BodyForce:
 
 @dataclass(frozen=True)
 class PointForce:
-    """A total force, shared equally by the nodes of a group.
+    """A total force, shared by the nodes of a group.
 
     Args:
         where: Name of a group, usually of one node.
-        value: Components, force (the whole thickness or ring).
+        value: Components, force (the whole thickness or ring), each a number, shared equally, or a
+            function of position: the force on a node is its value there over the number of nodes.
         amplitude: Factor in time.
         name: What the history calls it.
     """
 
     where: str
-    value: tuple[float, ...]
+    value: tuple[Field, ...]
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
 
@@ -233,7 +234,7 @@ class PointForce:
         """Check names and components."""
         _check_names(type(self).__name__, self.where, self.name)
         owner = f"load '{self.title}'"
-        keep(self, value=_components(owner, self.value, functions=False))
+        keep(self, value=_components(owner, self.value))
 
     @property
     def title(self) -> str:

@@ -158,11 +158,20 @@ class Plasticity(Term):
 
     def commit(self, u: fem.Function) -> None:
         """Keep plastic strain and stress, add the plastic work; collective."""
-        self._plastic_work += self._integral([p.plastic_work() for p in self._points])
-        if self._rise is not None:
-            self._thermal_work += self._integral([p.thermal_work() for p in self._points])
+        self._plastic_work += self.path_spent(u)
+        self._thermal_work += self.path_work(u)
         for p in self._points:
             p.commit()
+
+    def path_spent(self, u: fem.Function) -> float:
+        """Plastic work since the last commit."""
+        return self._integral([p.plastic_work() for p in self._points])
+
+    def path_work(self, u: fem.Function) -> float:
+        """Work of the temperature since the last commit."""
+        if self._rise is None:
+            return 0.0
+        return self._integral([p.thermal_work() for p in self._points])
 
     def _integral(self, densities: list[Array]) -> float:
         if self._integrated is None:

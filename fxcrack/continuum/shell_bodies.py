@@ -29,7 +29,12 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.kinematics import Shell
 from fxcrack.continuum.section import Section
-from fxcrack.continuum.shell_frames import cell_signs, nodal_directors, section_axes
+from fxcrack.continuum.shell_frames import (
+    cell_signs,
+    covariant_to_axes,
+    nodal_directors,
+    section_axes,
+)
 from fxcrack.continuum.shell_layout import ShellLayout
 from fxcrack.continuum.shell_strains import ShellElement, shell_element
 from fxcrack.continuum.strain_cells import StrainCells
@@ -173,7 +178,7 @@ class ShellBodies(Continuum):
             )
         raise_on_all_ranks(self.comm, problem)
         d = np.einsum("pk,ckx->cpx", element.values, directors)
-        to_axes = _to_axes(np.stack([tangents[0], tangents[1], d], axis=-1), axes)
+        to_axes = covariant_to_axes(np.stack([tangents[0], tangents[1], d], axis=-1), axes)
         weight = jacobian * element.weights
         rule = element.bending > 0.0
         size = (weight * rule).sum(axis=1)
@@ -206,7 +211,7 @@ class ShellBodies(Continuum):
         j0 = np.linalg.norm(normal, axis=-1)
         normal = normal / j0[:, None] * sign[:, None]
         axes, _ = section_axes(normal, section.axis)
-        to_axes = _to_axes(np.stack([g[0], g[1], normal], axis=-1), axes)[..., [0, 1, 5]]
+        to_axes = covariant_to_axes(np.stack([g[0], g[1], normal], axis=-1), axes)[..., [0, 1, 5]]
         r, s = (2.0 * self.element.points - 1.0).T
         zero = 0.0 * r
         modes = np.array(
@@ -266,28 +271,6 @@ class ShellBodies(Continuum):
     def change_of_director(self, q: Any) -> Any:
         """UFL change of the director among the unknowns."""
         return ufl.as_vector([q[i] for i in range(3, 6)])
-
-
-def _to_axes(basis: Array, axes: Array) -> Array:
-    """Local Voigt strains, engineering shears, per covariant strain 11, 22, 33, 23, 13, 12.
-
-    Args:
-        basis: Columns are the covariant basis, shape (..., 3, 3).
-        axes: Rows are the local axes, shape (..., 3, 3).
-
-    Returns:
-        Shape (..., 6, 6).
-    """
-    t = axes @ np.linalg.inv(basis).swapaxes(-1, -2)  # t[a, i] = G^i . e_a
-    pairs = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-    out = np.empty((*t.shape[:-2], 6, 6))
-    for row, (a, b) in enumerate(pairs):
-        for column, (i, j) in enumerate(pairs):
-            value = t[..., a, i] * t[..., b, j]
-            if i != j:
-                value = value + t[..., a, j] * t[..., b, i]
-            out[..., row, column] = value if a == b else 2.0 * value
-    return out
 
 
 __all__ = ["ShellBodies", "ShellPart"]

@@ -33,8 +33,8 @@ from fxcrack.continuum.reduced_integration import WeightedMeasure, rule
 from fxcrack.continuum.stacking import find_stacking
 from fxcrack.mesh import Mesh
 
-_DEGREE = 4
-"""Of the stiffness over the thickness: strains of second-order cells are quadratic in zeta."""
+_DEGREE = {1: 2, 2: 4}
+"""Of the stiffness over the thickness, by order: strains are of half that degree in zeta."""
 _SAME_THICKNESS = 0.02
 """Laminate and mesh may differ by this part without a warning."""
 _LOST = 10.0 * float(np.finfo(np.float64).eps)
@@ -52,16 +52,18 @@ PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 class ShellCells:
-    """Second-order continuum-shell cells of one group.
+    """Continuum-shell cells of one group.
 
     Args:
         mesh: Hexahedra.
         cells: Local cells of the group, owned and ghost.
         shell: What the user asked for.
         name: What messages call the cells.
+        order: Order of the displacement, 1 or 2.
 
     Attributes:
         name: The group.
+        order: Order of the displacement.
         stacking: Thickness direction of each cell.
         layers: The part of the laminate in each layer of cells, bottom first.
         first_plies: Number of the first ply in each layer, from 0.
@@ -70,6 +72,7 @@ class ShellCells:
         heights: Thickness of each cell of ``stacking.cells``, length.
         size: Mean side of a cell in the plane, length.
         zeta: Thickness coordinate, a UFL coefficient.
+        direction: The user's axis in each cell, not projected, shape (n_cells, 3).
         axes: Unit vectors e1, e2, e3, UFL.
         stiffness: In global axes, UFL, shape (6, 6), force/length^2.
         strain_rotation: Takes Voigt strains from global to laminate axes, UFL, shape (6, 6).
@@ -80,10 +83,16 @@ class ShellCells:
     """
 
     def __init__(
-        self, mesh: Mesh, cells: npt.NDArray[np.integer], shell: ContinuumShell, name: str
+        self,
+        mesh: Mesh,
+        cells: npt.NDArray[np.integer],
+        shell: ContinuumShell,
+        name: str,
+        order: int,
     ) -> None:
         self.shell = shell
-        self._mesh, self.name = mesh, name
+        self._mesh, self.name, self.order = mesh, name, order
+        self._degree = _DEGREE[order]
         self.stacking = find_stacking(mesh, cells, shell.bottom, shell.top, name)
         domain = mesh.domain
         self._each_cell = fem.functionspace(domain, ("DG", 0))
@@ -166,7 +175,8 @@ class ShellCells:
         mesh = self._mesh
         x = mesh.domain.geometry.x[compat.geometry_dofmap(mesh.domain)[self.stacking.cells].ravel()]
         ends = np.concatenate([x, -x]).reshape(2, -1, 3).max(axis=1, initial=-np.inf)
-        length = float(np.linalg.norm(mesh.comm.allreduce(ends, op=MPI.MAX).sum(axis=0)))
+        mesh.comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
+        length = float(np.linalg.norm(ends.sum(axis=0)))
         lost = _LOST * (length / self.thickness) ** 4
         if lost > _TOO_MUCH_LOST:
             log.warn(
@@ -185,17 +195,17 @@ class ShellCells:
         """Unit vectors of the laminate axes, UFL; collective."""
         slope = ufl.grad(self.zeta)
         normal = slope / ufl.sqrt(ufl.dot(slope, slope))
-        direction = self._direction()
+        self.direction = self._directions()
+        direction = self._by_cell(self.direction)
         inside = direction - ufl.dot(direction, normal) * normal
         first = inside / ufl.sqrt(ufl.dot(inside, inside))
         return [first, ufl.cross(normal, first), normal]
 
-    def _direction(self) -> Any:
-        """The user's axis as a UFL vector; collective."""
+    def _directions(self) -> Array:
+        """The user's axis in each cell, shape (n_cells, 3); collective."""
         domain, on, axis = self._mesh.domain, self.stacking, self.shell.axis
         centre = np.full((1, 3), 0.5)
         normal = ufl.grad(self.zeta)
-        space = fem.functionspace(domain, basix.ufl.element("DG", "hexahedron", 0, shape=(3,)))
         expression = fem.Expression(normal, centre)
         normals = np.asarray(expression.eval(domain, on.cells.astype(np.int32)))
         normals = normals.reshape(-1, 3)
@@ -228,19 +238,33 @@ class ShellCells:
                 "another direction, or a function of position"
             )
         raise_on_all_ranks(self._mesh.comm, problem, InputError)
+        return np.array(given)
+
+    def _by_cell(self, vectors: Array) -> fem.Function:
+        """One vector for each cell as a UFL coefficient."""
+        domain, cells = self._mesh.domain, self.stacking.cells
+        space = fem.functionspace(domain, basix.ufl.element("DG", "hexahedron", 0, shape=(3,)))
         out = fem.Function(space)
-        out.x.array.reshape(-1, 3)[_dofs_of(space, on.cells)] = given
+        out.x.array.reshape(-1, 3)[_dofs_of(space, cells)] = vectors
         return out
 
     # -- stiffness and integration --------------------------------------------------------
 
     def _moduli(self) -> list[tuple[int, Any]]:
         """Powers of zeta and their coefficients in laminate axes, UFL."""
+        layers = self.polynomials
+        powers = [i for i in range(self._degree + 1) if any(c[i].any() for c in layers)]
+        return [(i, self._field([c[i] for c in layers])) for i in powers]
+
+    @cached_property
+    def polynomials(self) -> list[Array]:
+        """Coefficients c_i of each layer of cells in laminate axes, with the shear factors.
+
+        Each of shape (degree + 1, 6, 6), force/length^2.
+        """
         k13, k23 = self.shear_factors
         factor = np.sqrt(np.array([1.0, 1.0, 1.0, k23, k13, 1.0]))
-        layers = [p.polynomial(_DEGREE) * np.outer(factor, factor) for p in self.layers]
-        powers = [i for i in range(_DEGREE + 1) if any(c[i].any() for c in layers)]
-        return [(i, self._field([c[i] for c in layers])) for i in powers]
+        return [p.polynomial(self._degree) * np.outer(factor, factor) for p in self.layers]
 
     def _field(self, layers: list[Array]) -> Any:
         """Values of each layer of cells, all of one shape, as a UFL coefficient."""
@@ -262,22 +286,24 @@ class ShellCells:
         C a and C A in global axes, shape (6,), and (a C a, a C A, A C A), shape (3,); see
         :meth:`fxcrack.Laminate.thermal_polynomials`.
         """
-        of_layers = [p.thermal_polynomials(_DEGREE) for p in self.layers]
+        of_layers = [p.thermal_polynomials(self._degree) for p in self.layers]
         found = []
         for which in range(3):
             layers = [p[which] for p in of_layers]
-            powers = [i for i in range(_DEGREE + 1) if any(c[i].any() for c in layers)] or [0]
+            powers = [i for i in range(self._degree + 1) if any(c[i].any() for c in layers)] or [0]
             found.append(sum(self.zeta**i * self._field([c[i] for c in layers]) for i in powers))
         turn = ufl.transpose(self.strain_rotation)
         return ufl.dot(turn, found[0]), ufl.dot(turn, found[1]), found[2]
 
-    def measure(self, dx: Any, tags: dict[int, int]) -> WeightedMeasure:
-        """The partially reduced measure of the cells.
+    def measure(self, dx: Any, tags: dict[int, int]) -> Any:
+        """The measure of the cells, partially reduced for displacements of second order.
 
         Args:
             dx: Measure of the mesh with its marked cells.
             tags: Mark of the cells of each thickness axis; those that no rank has are left out.
         """
+        if self.order == 1:
+            return dx(tuple(tags.values()))
         graded = any(i for i, _ in self._powers)
         parts = []
         for axis, tag in tags.items():
@@ -297,7 +323,12 @@ class ShellCells:
             f"{len(self.layers)} {'cell' if len(self.layers) == 1 else 'cells'} over the thickness "
             f"{self.thickness:.4g}, side over thickness of a cell "
             f"{self.size * len(self.layers) / self.thickness:.3g}, shear factors {k13:.4g} and "
-            f"{k23:.4g}, partially reduced integration"
+            f"{k23:.4g}, "
+            + (
+                "first order, tied and enhanced strains"
+                if self.order == 1
+                else "partially reduced integration"
+            )
         )
 
 

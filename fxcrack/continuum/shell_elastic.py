@@ -8,7 +8,7 @@ from dolfinx import fem
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
-from fxcrack.continuum.cell_assembly import add_matrices, add_to_vector
+from fxcrack.continuum.cell_assembly import add_forces, add_matrices
 from fxcrack.continuum.shell_bodies import ShellBodies, ShellPart
 from fxcrack.continuum.term import Term
 
@@ -37,15 +37,13 @@ class ShellElastic(Term):
         vectors = np.asarray(u.x.array).reshape(-1, 2, 3)[part.nodes]
         return np.asarray(vectors.reshape(len(part.nodes), 2 * part.nodes.shape[1], 3))
 
-    def add_residual(self, vector: PETSc.Vec, u: fem.Function) -> None:
+    def add_residual(self, forces: Array, u: fem.Function) -> None:
         """Add the forces of the cells."""
-        found = []
         for part in self._shell.shell_parts:
             response = part.strain_cells.respond(
                 self._changes(part, u), finite=self.finite, tangent=False
             )
-            found.append((part.nodes, response.residual))
-        add_to_vector(vector, self._shell.space, found)
+            add_forces(forces, part.nodes, response.residual)
 
     def add_tangent(self, matrix: PETSc.Mat, u: fem.Function) -> None:
         """Add the tangents of the cells."""

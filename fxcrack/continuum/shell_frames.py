@@ -160,4 +160,26 @@ def section_axes(normal: Array, axis: Sequence[float]) -> tuple[Array, bool]:
     return np.stack([e1, np.cross(normal, e1), normal], axis=-2), fits
 
 
-__all__ = ["cell_signs", "nodal_directors", "section_axes"]
+def covariant_to_axes(basis: Array, axes: Array) -> Array:
+    """Local Voigt strains, engineering shears, per covariant strain 11, 22, 33, 23, 13, 12.
+
+    Args:
+        basis: Columns are the covariant basis, shape (..., 3, 3).
+        axes: Rows are the local axes, shape (..., 3, 3).
+
+    Returns:
+        Shape (..., 6, 6).
+    """
+    t = axes @ np.linalg.inv(basis).swapaxes(-1, -2)  # t[a, i] = G^i . e_a
+    pairs = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+    out = np.empty((*t.shape[:-2], 6, 6))
+    for row, (a, b) in enumerate(pairs):
+        for column, (i, j) in enumerate(pairs):
+            value = t[..., a, i] * t[..., b, j]
+            if i != j:
+                value = value + t[..., a, j] * t[..., b, i]
+            out[..., row, column] = value if a == b else 2.0 * value
+    return out
+
+
+__all__ = ["cell_signs", "covariant_to_axes", "nodal_directors", "section_axes"]

@@ -59,14 +59,15 @@ class StrainCells:
         vectors: R of each cell, shape (n_cells, n_vectors, 3).
         matrices: M of each point and covariant strain, shape (n_points, n_covariant, n_vectors,
             n_vectors), symmetric.
-        local: L, shape (n_cells, n_points, n_strains, n_covariant).
+        local: L, shape (n_cells, n_points, n_strains, n_covariant); ``None`` where the strains e
+            are the covariant ones themselves.
         enhanced: N, shape (n_cells, n_points, n_strains, n_enhanced).
         moduli: C with the weights, shape (n_cells, n_points, n_strains, n_strains).
     """
 
     vectors: Array
     matrices: Array
-    local: Array
+    local: Array | None
     enhanced: Array
     moduli: Array
 
@@ -87,13 +88,14 @@ class StrainCells:
     def _flat(self, at: slice, b: Array) -> tuple[Array, Array, Array]:
         """B, C B and N of some cells, rows of all points together."""
         n = len(b)
-        b = self.local[at] @ b
+        if self.local is not None:
+            b = self.local[at] @ b
         cb = self.moduli[at] @ b
         enhanced = self.enhanced[at]
         return (
             b.reshape(n, -1, b.shape[-1]),
             cb.reshape(n, -1, b.shape[-1]),
-            enhanced.reshape(n, -1, enhanced.shape[-1]),
+            enhanced.reshape(n, b.shape[1] * b.shape[2], enhanced.shape[-1]),
         )
 
     def _condensed(self, at: slice, b: Array) -> Array:
@@ -131,7 +133,7 @@ class StrainCells:
         Returns:
             Shape (n_cells, n_points, n_covariant).
         """
-        out = np.empty((*self.local.shape[:2], self.matrices.shape[1]))
+        out = np.empty((self.n_cells, *self.matrices.shape[:2]))
         for at in self._chunks():
             middle = self.vectors[at] + (0.5 * q[at] if finite else 0.0)
             flat = q[at].reshape(len(middle), -1)
@@ -149,8 +151,13 @@ class StrainCells:
         Returns:
             Shape (n_cells, n_points, n_strains).
         """
-        e = np.einsum("cpsk,cpk->cps", self.local, self.covariant(q, finite=finite))
+        e = self._to_local(slice(None), self.covariant(q, finite=finite))
         return self._with_enhanced(slice(None), e, None if stress is None else stress)
+
+    def _to_local(self, at: slice, covariant: Array) -> Array:
+        if self.local is None:
+            return covariant
+        return np.asarray(np.einsum("cpsk,cpk->cps", self.local[at], covariant))
 
     def _with_enhanced(self, at: slice, e: Array, stress: Array | None) -> Array:
         enhanced = self.enhanced[at]
@@ -182,7 +189,7 @@ class StrainCells:
             n = len(r0)
             middle = self._products(r0 + (0.5 * change if finite else 0.0))
             covariant = np.einsum("cpkj,cj->cpk", middle, change.reshape(n, -1))
-            e = np.einsum("cpsk,cpk->cps", self.local[at], covariant)
+            e = self._to_local(at, covariant)
             given = None if stress is None else stress[at]
             e = self._with_enhanced(at, e, given)
             force = np.einsum("cpst,cpt->cps", self.moduli[at], e)
@@ -191,7 +198,9 @@ class StrainCells:
                 energy[at] -= np.einsum("cps,cps->c", e, given)
                 force = force - given
             b = self._products(r0 + change) if finite else middle
-            back = np.einsum("cpsk,cps->cpk", self.local[at], force)
+            back = force
+            if self.local is not None:
+                back = np.einsum("cpsk,cps->cpk", self.local[at], force)
             residual[at] = np.einsum("cpkj,cpk->cj", b, back)
             if tangent:
                 second[at] = self._condensed(at, b)

@@ -32,6 +32,28 @@ def small_stress(continuum: Continuum, i: int, strain: Any) -> Any:
     return whole_stress(continuum, i, strain)
 
 
+def tied_stress(continuum: Continuum, i: int, u: fem.Function, *, finite: bool) -> fem.Function:
+    """Stress of a part that is a first-order continuum shell, by its own strains; collective.
+
+    Args:
+        continuum: Bodies with ``tied_cells``.
+        i: Which part.
+        u: Displacement, length.
+        finite: Cauchy stress of the Green-Lagrange strain.
+
+    Returns:
+        Means of its cells, 0 in others, components in the order of ``model.stress_labels``.
+    """
+    part, n = continuum.tied_cells[i], len(continuum.model.stress_labels)
+    domain = continuum.mesh.domain
+    element = basix.ufl.element("DG", domain.basix_cell(), 0, shape=(n,))
+    out = fem.Function(fem.functionspace(domain, element))
+    dofs = out.function_space.dofmap.list[part.cells, 0]
+    out.x.array.reshape(-1, n)[dofs] = part.stress_means(u, finite=finite)
+    out.x.scatter_forward()
+    return out
+
+
 def cell_stress(continuum: Continuum, u: fem.Function) -> fem.Function:
     """Cell averages of the stress of the small strain; collective.
 
@@ -47,7 +69,13 @@ def cell_stress(continuum: Continuum, u: fem.Function) -> fem.Function:
     """
     strain = continuum.model.strain(u, continuum.x)
     parts = [
-        (small_stress(continuum, i, strain), dx) for i, (_, _, dx) in enumerate(continuum.parts)
+        (
+            tied_stress(continuum, i, u, finite=False)
+            if i in continuum.tied_cells
+            else small_stress(continuum, i, strain),
+            dx,
+        )
+        for i, (_, _, dx) in enumerate(continuum.parts)
     ]
     return cell_means(continuum, parts)
 

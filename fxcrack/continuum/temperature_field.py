@@ -45,6 +45,7 @@ class TemperatureField:
         rise: T - T_ref at present.
         patterns: T_k - T_ref of the patterns.
         amplitudes: Their factors in time.
+        factors: Present factors of the patterns, shape (n_patterns,).
         version: Counts the changes of ``rise``.
     """
 
@@ -67,7 +68,7 @@ class TemperatureField:
             _interpolate(pattern, field, effect.reference)
             self.patterns.append(pattern)
             self.amplitudes.append(amplitude)
-        self._factors = np.zeros(len(self.patterns))
+        self.factors = np.zeros(len(self.patterns))
         self.set(0.0)
 
     @property
@@ -78,9 +79,9 @@ class TemperatureField:
     def set(self, time: float) -> None:
         """Make a time the present one."""
         factors = np.array([a(time) for a in self.amplitudes])
-        if np.array_equal(factors, self._factors):
+        if np.array_equal(factors, self.factors):
             return
-        self._factors = factors
+        self.factors = factors
         self.rise.x.array[:] = 0.0
         for factor, pattern in zip(factors, self.patterns, strict=True):
             self.rise.x.array[:] += factor * pattern.x.array

@@ -50,8 +50,13 @@ class Term:
     closed: bool = True
     by_cells: bool = False
 
-    def add_residual(self, vector: PETSc.Vec, u: fem.Function) -> None:
-        """Add internal minus external forces to a ghosted vector, ghosts too, by cells."""
+    def add_residual(self, forces: Array, u: fem.Function) -> None:
+        """Add internal minus external forces of the local dofs, ghosts too, by cells.
+
+        Args:
+            forces: Shape (n_dofs,), changed in place; the caller sums up over ranks.
+            u: Displacement.
+        """
 
     def add_tangent(self, matrix: PETSc.Mat, u: fem.Function) -> None:
         """Add their change with u, by cells; the caller assembles."""
@@ -91,6 +96,13 @@ class Term:
 
     def path_work(self, u: fem.Function) -> float:
         """Work it does on the bodies on the straight path from the last commit to u; collective.
+
+        In force x length.
+        """
+        return 0.0
+
+    def path_spent(self, u: fem.Function) -> float:
+        """Energy it dissipates on the straight path from the last commit to u; collective.
 
         In force x length.
         """
@@ -170,9 +182,12 @@ class StoringTerm(Term):
 
 
 def parts_of(continuum: Continuum, form: str) -> list[int]:
-    """Parts of a continuum whose material names a form of its own, or "elastic" for the others."""
+    """Parts of a continuum whose material names a form of its own, or "elastic" for the others.
+
+    Those that no form describes, first-order continuum shells, are not among them.
+    """
     forms = [getattr(m, "form", "elastic") for m in continuum.part_materials]
-    return [i for i, f in enumerate(forms) if f == form]
+    return [i for i, f in enumerate(forms) if f == form and i not in continuum.tied_cells]
 
 
 __all__ = ["StoringTerm", "Term", "parts_of"]

@@ -89,6 +89,14 @@ class WeakForm:
         return all(t.closed for t in self.terms)
 
     @property
+    def accountable(self) -> bool:
+        """Whether the energies of an increment are known before it is accepted.
+
+        So they are where all work is stored, or dissipated at once by a law of the material.
+        """
+        return not self.dynamic and all(t.closed or t.path_dependent for t in self.terms)
+
+    @property
     def path_dependent(self) -> bool:
         """Whether stresses depend on the loading history."""
         return any(t.path_dependent for t in self.terms)
@@ -142,7 +150,8 @@ class WeakForm:
         for term, form, _ in self._forms:
             start = time.perf_counter()
             if form is None:
-                term.add_residual(vector, self.u)
+                with vector.localForm() as local:
+                    term.add_residual(local.array, self.u)
             else:
                 dolfinx.fem.petsc.assemble_vector(vector, form)
             self._add(term.name, start)
@@ -221,6 +230,10 @@ class WeakForm:
     def path_work(self) -> float:
         """Work the terms do on the straight path from the last commit to here; collective."""
         return sum(term.path_work(self.u) for term in self.terms)
+
+    def path_spent(self) -> float:
+        """Energy the terms dissipate on the straight path from the last commit; collective."""
+        return sum(term.path_spent(self.u) for term in self.terms)
 
     def work(self) -> float:
         """Work done on the bodies through the terms up to the last commit; collective."""

@@ -95,6 +95,11 @@ class Criterion(Protocol):
         return False
 
     @property
+    def needs_free_faces(self) -> bool:
+        """Whether bonds must lose their force at once, so that none acts behind the tips."""
+        return False
+
+    @property
     def needs_wake_openings(self) -> bool:
         """Whether the openings at the wake nodes must be known at every tip."""
         return False

@@ -11,7 +11,14 @@ import numpy.typing as npt
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.checks import format_point, keep_floats, not_negative, one_of
+from fxcrack.base.checks import (
+    format_point,
+    keep_floats,
+    not_negative,
+    one_of,
+    positive,
+    whole,
+)
 from fxcrack.base.errors import InputError
 from fxcrack.criteria.closure_lengths import LARGEST_RATIO, opening_shares, uneven
 from fxcrack.criteria.crack_closure import (
@@ -22,8 +29,10 @@ from fxcrack.criteria.crack_closure import (
     weighted_rates,
 )
 from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.domain_integral import RINGS, DomainIntegral, DomainValues, domain_rates
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
+from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.criteria.mixed_mode import BK, MixedMode, law_of, total
 from fxcrack.criteria.probe import (
     FrontProbe,
@@ -39,7 +48,8 @@ from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.tips import FrontUnits, Tips, edge_midsides, units_of
 
-Method = Literal["vcct", "closure"]
+Method = Literal["vcct", "closure", "domain"]
+METHODS = ("vcct", "closure", "domain")
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +65,15 @@ class RateCriterion(Criterion):
             :class:`~fxcrack.criteria.mixed_mode.FunctionLaw`. Needed as soon as GIIc or GIIIc is
             given. Without them all modes have the toughness GIc and f = G_T/GIc.
         tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
-        method: "vcct", or "closure": the exact energy of releasing the node.
+        method: "vcct"; "closure": the exact energy of releasing the node; or "domain": an integral
+            over a ring of cells around the tip, for elastic bodies
+            (:mod:`~fxcrack.criteria.domain_integral`).
         normalisation: Length VCCT divides by, see
             :func:`~fxcrack.criteria.crack_closure.energy_release_rates`.
+        rings: Outer radius of the ring of method="domain", in lengths of the cells at the tip. It
+            is less where the cells on one side are of several materials.
+        reference_length: Length to which the modes belong where the two sides are of different
+            materials [length]; see :mod:`~fxcrack.criteria.crack_tip_fields`.
     """
 
     GIc: Property
@@ -67,6 +83,8 @@ class RateCriterion(Criterion):
     tolerance: float = field(default=0.2, kw_only=True)
     method: Method = field(default="vcct", kw_only=True)
     normalisation: Normalisation = field(default="equal_length", kw_only=True)
+    rings: int = field(default=RINGS, kw_only=True)
+    reference_length: float | None = field(default=None, kw_only=True)
 
     knows_toughness: ClassVar[bool] = True
     release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "increments", "opening"))
@@ -76,8 +94,17 @@ class RateCriterion(Criterion):
         """Check everything that does not need the interface."""
         not_negative(self._owner, tolerance=self.tolerance)
         keep_floats(self, "tolerance")
-        one_of(self._owner, "method", self.method, ("vcct", "closure"))
+        one_of(self._owner, "method", self.method, METHODS)
         one_of(self._owner, "normalisation", self.normalisation, NORMALISATIONS)
+        if self.method == "domain" and self.grows_in_cycles:
+            raise InputError(
+                f"{self._owner}: method='domain' is for static steps; take method='vcct' or "
+                "method='closure' in cycles"
+            )
+        if whole(self._owner, "rings", self.rings) < 1:
+            raise InputError(f"{self._owner}: rings = {self.rings}: give 1 or more, e.g. 3")
+        if self.reference_length is not None:
+            positive(self._owner, reference_length=self.reference_length)
         if self.mix is not None:
             object.__setattr__(self, "mix", law_of(self._owner, self.mix))
         if self.mix is None and not (self.GIIc is None and self.GIIIc is None):
@@ -93,6 +120,11 @@ class RateCriterion(Criterion):
     ) -> RateEvaluator:
         """The criterion on one interface; arguments as for :meth:`Criterion.evaluator`."""
         return RateEvaluator(probe, self, temperature, softens=softens)
+
+    @property
+    def needs_free_faces(self) -> bool:
+        """The ring does not know tractions of bonds that are released little by little."""
+        return self.method == "domain"
 
     @property
     def degree(self) -> float | None:
@@ -242,6 +274,7 @@ class RateEvaluator(SofteningEvaluator):
     """
 
     toughness: Array
+    ligaments: Ligaments | None = None
 
     def __init__(
         self,
@@ -259,6 +292,9 @@ class RateEvaluator(SofteningEvaluator):
         self._shared: tuple[Tips, Array | None, Ints] | None = None
         self._uneven_said = False
         self._weights = np.zeros((0, 1))
+        self._domain: DomainIntegral | None = None
+        if criterion.method == "domain":
+            self._domain = DomainIntegral(probe, criterion.rings, criterion.reference_length)
         surface = probe.pair.surface
         criterion.check_slaves(surface.n_nodes)
         if softens and criterion.needs_exact_S and not criterion.softens:
@@ -285,9 +321,13 @@ class RateEvaluator(SofteningEvaluator):
     def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Tip forces [force] and the openings they are multiplied with [length], shape (n, 6 k).
 
-        A last column holds the temperature of the tips where it changes in time.
+        A further column holds the temperature of the tips where it changes in time; then comes what
+        method="domain" measures.
         """
         force = bond_forces(self.probe, tips, state)
+        # what nothing pulls apart would otherwise grow under loads of 1e10 and more
+        noise = self.probe.round_off(tips.force_nodes, state).max(axis=1)
+        force = np.where(np.abs(force) < noise[:, None, None], 0.0, force)
         if self.criterion.method == "closure":
             opening = closure_jumps(self.probe, tips, force)
         else:
@@ -296,9 +336,14 @@ class RateEvaluator(SofteningEvaluator):
                 # on a ring the midside force belongs to its own circumference
                 breadth = self.probe.front.surface.breadth
                 force[:, 1] *= (breadth[tips.node] / breadth[tips.force_nodes[:, 1]])[:, None]
+        if self.ligaments is not None:
+            normalisation = self.criterion.normalisation
+            self.ligaments.put(self.probe, tips, state, normalisation, force, opening)
         columns = [force.reshape(len(tips), -1), opening.reshape(len(tips), -1)]
         if self._moving and self._temperature is not None:
             columns.append(self._temperature(time)[tips.node, None])
+        if self._domain is not None:
+            columns.append(self._domain.measure(tips, state))
         return np.concatenate(columns, 1)
 
     def _openings(self, tips: Tips, state: State) -> Array:
@@ -356,7 +401,7 @@ class RateEvaluator(SofteningEvaluator):
     def needs(self, tips: Tips) -> Ints:
         """On uneven spacing the second corner node behind each tip, shape (m,)."""
         criterion = self.criterion
-        if criterion.method != "vcct" or criterion.normalisation != "equal_length":
+        if criterion.method == "closure" or criterion.normalisation != "equal_length":
             return np.zeros(0, dtype=np.int64)
         _, rows = self._shares_of(tips)
         return np.unique(tips.further_nodes[rows])
@@ -366,13 +411,29 @@ class RateEvaluator(SofteningEvaluator):
 
         Args:
             tips: Front nodes.
-            measured: From :meth:`measure`, shape (n, 6 k), or (n, 6 k + 1) with temperature.
+            measured: From :meth:`measure`.
         """
-        half = measured.shape[1] // 2
+        return self._rates(tips, measured, self._integrals(tips, measured))
+
+    def _rates(self, tips: Tips, measured: Array, found: DomainValues | None) -> Array:
+        """The same, with what method="domain" has found."""
+        half = 3 * tips.force_nodes.shape[1]
         force, opening = (
             m.reshape(len(tips), -1, 3) for m in (measured[:, :half], measured[:, half : 2 * half])
         )
         force = _real(force)
+        if found is not None:
+            rates = domain_rates(found, opening, contact=self.probe.pair.interface.contact)
+            # where no bond is pulled, the ring holds round-off alone
+            rates = np.where(force.any(axis=(1, 2))[:, None], rates, 0.0)
+            if not tips.ligament.any():
+                return rates
+            # a crack that grows from both sides at once is no extension of one tip
+            return np.where(tips.ligament[:, None], self._closed(tips, force, opening), rates)
+        return self._closed(tips, force, opening)
+
+    def _closed(self, tips: Tips, force: Array, opening: Array) -> Array:
+        """Rates by crack closure, shape (n, 3), force/length."""
         if self.criterion.method == "closure":
             return closure_rates(force, opening, tips.area)
         if tips is not self._weighed:
@@ -388,14 +449,19 @@ class RateEvaluator(SofteningEvaluator):
 
         Args:
             tips: Front nodes.
-            measured: From :meth:`measure`, shape (n, 6 k), or (n, 6 k + 1) with temperature.
+            measured: From :meth:`measure`.
 
         Returns:
-            f, shape (n,), and "GI", "GII", "GIII", each of shape (n,) [force/length].
+            f, shape (n,), and "GI", "GII", "GIII", each of shape (n,) [force/length]; of
+            method="domain" the intensity factors "KI", "KII", "KIII" as well
+            [force/length^1.5].
         """
-        rates = self.rates(tips, measured)
+        found = self._integrals(tips, measured)
+        rates = self._rates(tips, measured, found)
         toughness = self._toughness(tips, measured)
         report = dict(zip(("GI", "GII", "GIII"), rates.T, strict=True))
+        if found is not None:
+            report |= dict(zip(("KI", "KII", "KIII"), found.factors.T, strict=True))
         if not self._edges:
             return self.criterion.ratio(rates, toughness), report
         units = self.units(tips)
@@ -403,6 +469,19 @@ class RateEvaluator(SofteningEvaluator):
         rates, toughness = (units.mean(v.reshape(-1, n, 3)) for v in (rates, toughness))
         f = self.criterion.ratio(rates.reshape(-1, 3), toughness.reshape(-1, 3))
         return units.at_tips(f.reshape(rates.shape[:2])).ravel(), report
+
+    def _integrals(self, tips: Tips, measured: Array) -> DomainValues | None:
+        """What method="domain" finds, ``None`` for the others."""
+        if self._domain is None:
+            return None
+        return self._domain.values(tips, measured[:, self._columns_before(tips) :])
+
+    def _columns_before(self, tips: Tips) -> int:
+        """Columns of what is measured before those of method="domain"."""
+        return 6 * int(tips.force_nodes.shape[1]) + int(self._moving)
+
+    def _temperature_column(self, tips: Tips, measured: Array) -> Array:
+        return np.asarray(measured[:, 6 * tips.force_nodes.shape[1]])
 
     def units(self, tips: Tips) -> FrontUnits:
         """Tips that are released together; of tips that were repeated, those of the first time."""
@@ -415,7 +494,7 @@ class RateEvaluator(SofteningEvaluator):
         if self._temperature is None:
             return None
         if self._moving and measured is not None:
-            return measured[:, -1]
+            return self._temperature_column(tips, measured)
         return self._temperature(0.0)[tips.node]
 
     def _toughness(self, tips: Tips, measured: Array | None) -> Array:
@@ -424,7 +503,8 @@ class RateEvaluator(SofteningEvaluator):
             return self.toughness[tips.node]
         surface = self.probe.pair.surface
         x = surface.x[tips.node, : self.probe.gdim]
-        return self.criterion.toughness_at(x, tips.node, measured[:, -1], n_slave=surface.n_nodes)
+        at = self._temperature_column(tips, measured)
+        return self.criterion.toughness_at(x, tips.node, at, n_slave=surface.n_nodes)
 
     def to_soften(self, nodes: Ints, values: TipValues, release: ReleaseLaw) -> list[CohesiveUnit]:
         """Nodes that soften by one law each, and the energy it dissipates until they are free.

@@ -40,11 +40,15 @@ class Fatigue(RateCriterion):
             :class:`~fxcrack.criteria.growth_function.GrowthFunction`.
         credit: Whether growth of front nodes that are not released is kept for later cycles; else
             each of them starts its element anew.
+        partial: Whether every front node advances through its element cycle by cycle, its bond
+            fading in proportion (:mod:`fxcrack.criteria.ligaments`), so that a front in 3-D stays
+            smooth. Otherwise bonds fail one after the other, each at the end of its element.
     """
 
     paris: Paris | None = None
     growth: FatigueLaw | UserFunction | None = None
     credit: bool = field(default=False)
+    partial: bool = field(default=False)
 
     grows_in_cycles: ClassVar[bool] = True
 
@@ -76,6 +80,12 @@ class Fatigue(RateCriterion):
         given = self.paris if self.growth is None else self.growth
         keep(self, growth=fatigue_law_of("Fatigue", cast(FatigueLaw, given)))
         keep(self, credit=flag("Fatigue", "credit", self.credit))
+        keep(self, partial=flag("Fatigue", "partial", self.partial))
+        if self.partial and self.method != "vcct":
+            raise InputError(
+                f"Fatigue: partial=True needs method='vcct', not '{self.method}': the energy of "
+                "releasing a whole node says nothing of a part of it"
+            )
 
     def cycle(self, rates: npt.ArrayLike, toughness: npt.ArrayLike) -> CycleRates:
         """What a law needs from one stabilised cycle.

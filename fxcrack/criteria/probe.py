@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.continuum.continuum import Continuum
 from fxcrack.criteria.crack_closure import opens
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
@@ -19,6 +20,43 @@ from fxcrack.interface.tips import Tips
 
 State = Any
 """A state of the solver, e.g. an equilibrium; criteria pass it to the probe and read nothing."""
+
+
+class Bodies(Protocol):
+    """The bodies beside an interface, as integrals over them see them.
+
+    Attributes:
+        continuum: Their mesh, materials and model.
+        loads: Force patterns, without those of a temperature.
+        finite: Whether their strain is finite.
+        uncovered: What an integral for elastic bodies in equilibrium does not cover, in words;
+            empty where there is nothing.
+    """
+
+    continuum: Continuum
+    loads: list[Any]
+    finite: bool
+    uncovered: str
+
+    def displacements(self, nodes: Ints, state: State) -> Array:
+        """Displacements of global nodes, the same on all ranks; collective.
+
+        Args:
+            nodes: Global displacement nodes, sorted, shape (n,).
+            state: State of the solver.
+
+        Returns:
+            Shape (n, gdim) [length].
+        """
+        ...
+
+    def load_factors(self, state: State) -> Array:
+        """Factors of the force patterns, shape (n_loads,)."""
+        ...
+
+    def temperature_factors(self, state: State) -> Array:
+        """Factors of the temperature patterns, shape (n_patterns,)."""
+        ...
 
 
 class FrontProbe(Protocol):
@@ -42,11 +80,24 @@ class FrontProbe(Protocol):
         """Number of components of a displacement, 2 or 3."""
         ...
 
+    @property
+    def bodies(self) -> Bodies:
+        """The bodies; one back-substitution per state may be the price of what they answer."""
+        ...
+
     def bond_forces(self, nodes: Ints, state: State) -> Array:
         """Forces that the bonds hold the slave nodes with, tension positive.
 
         Returns:
             Global vectors, shape (..., 3) [force]; zero where nothing is bonded.
+        """
+        ...
+
+    def round_off(self, nodes: Ints, state: State) -> Array:
+        """How large bond forces may be by round-off alone.
+
+        Returns:
+            Largest of the components, shape (...) [force].
         """
         ...
 

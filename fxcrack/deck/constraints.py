@@ -11,17 +11,22 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.deck.cards import Card, label
+from fxcrack.deck.distributing import Distributing, by_reference, distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.supports import Link
 
 
-def read_links(cards: Sequence[Card], flat: Flat) -> list[Link]:
-    """Links of all constraint cards among model data.
+def read_links(cards: Sequence[Card], flat: Flat) -> tuple[list[Link], dict[int, Distributing]]:
+    """Links of all constraint cards among model data, and couplings that distribute loads.
+
+    Returns:
+        The links, and the couplings by their reference nodes.
 
     Raises:
         DeckError: A card is not complete, or of a kind that is not available.
     """
     links: list[Link] = []
+    distributed: list[Distributing] = []
     coupling: Card | None = None
     for card in cards:
         if card.keyword == "EQUATION":
@@ -33,11 +38,16 @@ def read_links(cards: Sequence[Card], flat: Flat) -> list[Link]:
                 card.fail("it belongs directly after *COUPLING")
             links += _kinematic(coupling, card, flat)
             coupling = None
+        elif card.keyword == "DISTRIBUTING":
+            if coupling is None:
+                card.fail("it belongs directly after *COUPLING")
+            distributed.append(distributing(coupling, card, _reference(coupling, flat), flat))
+            coupling = None
         elif card.keyword == "RIGIDBODY":
             links += _rigid(card, flat)
     if coupling is not None:
-        coupling.fail("*KINEMATIC must follow; couplings that distribute loads are not available")
-    return links
+        coupling.fail("*KINEMATIC or *DISTRIBUTING must follow")
+    return links, by_reference(distributed)
 
 
 def _equations(card: Card, flat: Flat) -> list[Link]:
@@ -104,7 +114,8 @@ def _rigid(card: Card, flat: Flat) -> list[Link]:
         card.fail("give ELSET, TIE NSET or PIN NSET; rigid surfaces are not available")
     nodes = flat.with_centres(np.unique(np.concatenate(parts)))
     name = card.text(names[0])
-    return _rigid_motion(card, name, nodes, set(range(6)), _reference(card, flat), flat)
+    dofs = set(range(3 if names == ["PIN NSET"] else 6))
+    return _rigid_motion(card, name, nodes, dofs, _reference(card, flat), flat)
 
 
 def _rigid_motion(
@@ -126,4 +137,6 @@ def _rigid_motion(
             if np.abs(arm).max(initial=0.0) > 0.0 and (gdim == 3 or of_dof == 5):
                 terms.append((reference, of_dof, arm if len(arm) else none))
         links.append(Link(card, name, nodes, dof, terms))
+    if flat.kind.shell:
+        links += [Link(card, name, nodes, d, [(reference, d, one)]) for d in sorted(dofs) if d >= 3]
     return links

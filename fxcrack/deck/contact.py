@@ -149,12 +149,17 @@ class Contacts:
                 )
             pair.bonded, pair.normal_only = row, normal_only
 
+    def slave_nodes(self) -> dict[str, Ints]:
+        """Nodes of the slave surfaces by the titles of the interfaces."""
+        found = {pair.title: self._slave_nodes(pair) for pair in self.pairs if pair.debonds}
+        return found | self._general.slave_nodes
+
     def _slave_nodes(self, pair: PairDef) -> Ints:
         return np.unique(self._flat.surface(pair.row.card, pair.slave, pair.row.index))
 
     # -- debonds of the steps ------------------------------------------------------------
 
-    def take(self, number: int, cards: Sequence[Card]) -> list[str]:
+    def take(self, number: int, cards: Sequence[Card]) -> dict[str, int]:
         """Read the ``*DEBOND`` cards of a step.
 
         Args:
@@ -162,12 +167,12 @@ class Contacts:
             cards: Of the step.
 
         Returns:
-            Titles of the interfaces that may grow in it.
+            Titles of the interfaces that may grow in it, and the increments between two outputs.
 
         Raises:
             DeckError: The criterion is missing, or the pair does not exist or is not bonded.
         """
-        grow = []
+        grow: dict[str, int] = {}
         for i, card in enumerate(cards):
             if card.keyword == "FRACTURECRITERION" and (i == 0 or cards[i - 1].keyword != "DEBOND"):
                 card.fail("it must stand directly after *DEBOND")
@@ -198,7 +203,7 @@ class Contacts:
             if any(n == number for n, _, _ in found[0].debonds):
                 card.fail("the pair has a criterion in this step already; one is possible")
             found[0].debonds.append((number, card, cards[i + 1]))
-            grow.append(found[0].title)
+            grow[found[0].title] = max(int(card.number("FREQUENCY", 1.0)), 0)
         return grow
 
     # -- the scene -----------------------------------------------------------------------
@@ -274,8 +279,8 @@ class Contacts:
     def _interface(self, pair: PairDef, interactions: dict[str, Family]) -> Interface:
         card, flat, groups = pair.row.card, self._flat, self._groups
         index = pair.row.index
-        slave = groups.facets(pair.slave, flat.surface(card, pair.slave, index))
-        master = groups.facets(pair.master, flat.surface(card, pair.master, index))
+        slave = groups.surface(card, pair.slave, index)
+        master = groups.surface(card, pair.master, index)
         bonded: object = Everywhere(card.has("TIED"))
         if pair.bonded is not None:
             name = label(pair.bonded.text(2))
@@ -366,15 +371,15 @@ class Contacts:
             criterion_card.fail(str(error))
 
     def _tie(self, row: Row) -> Interface:
-        card, flat, groups = row.card, self._flat, self._groups
+        card, groups = row.card, self._groups
         slave, master = label(row.text(0)), label(row.text(1))
         if not slave or not master or key(slave) == key(master):
             row.fail("a tie needs two surfaces, slave and master")
         card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "SURFACE TO SURFACE")
         tolerance = card.number("POSITION TOLERANCE", 0.0) or None
         return Interface(
-            groups.facets(slave, flat.surface(card, slave, row.index)),
-            groups.facets(master, flat.surface(card, master, row.index)),
+            groups.surface(card, slave, row.index),
+            groups.surface(card, master, row.index),
             bonded=Everywhere(True),
             tolerance=tolerance,
             name=card.text("NAME", default=slave),

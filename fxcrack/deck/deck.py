@@ -14,6 +14,7 @@ from fxcrack.deck.model import read_model
 from fxcrack.deck.procedures import DeckStep
 from fxcrack.deck.reader import read_cards
 from fxcrack.deck.report import Report
+from fxcrack.deck.tips import NodeNames
 from fxcrack.deck.translate import Translated, translate
 from fxcrack.history import History
 from fxcrack.mesh.distribute import distribute
@@ -30,12 +31,16 @@ class Deck:
         steps: The steps in order: each has a name, a step for :meth:`fxcrack.Scene.run`, and the
             names of the interfaces that may grow in it.
         report: What was read, replaced and ignored.
+        nodes: Names of the slave nodes of interfaces that may come apart, by title.
     """
 
-    def __init__(self, scene: Scene, steps: list[DeckStep], report: Report) -> None:
+    def __init__(
+        self, scene: Scene, steps: list[DeckStep], report: Report, nodes: dict[str, NodeNames]
+    ) -> None:
         self.scene = scene
         self.steps = steps
         self.report = report
+        self.nodes = nodes
 
     def run(self, **options: Any) -> History:
         """Run all steps, one after the other; collective.
@@ -85,10 +90,10 @@ def read_deck(
     """
     found = on_root(comm, lambda: translated(Path(path), order), DeckError)
     raw = None if found is None else found.raw
-    shared: tuple[dict[str, Any], list[DeckStep], Report] = comm.bcast(
-        None if found is None else (found.arguments, found.steps, found.report)
+    shared: tuple[dict[str, Any], list[DeckStep], Report, dict[str, NodeNames]] = comm.bcast(
+        None if found is None else (found.arguments, found.steps, found.report, found.nodes)
     )
-    arguments, steps, report = shared
+    arguments, steps, report, nodes = shared
     for line in report.replaced:
         log.warn("%s", line)
     mesh = distribute(raw, comm, Path(path).stem)
@@ -96,7 +101,7 @@ def read_deck(
         scene = Scene(mesh, **arguments)
     except InputError as error:
         raise DeckError(f"{Path(path).name}: {error}") from error
-    return Deck(scene, steps, report)
+    return Deck(scene, steps, report, nodes)
 
 
 def translated(path: Path, order: int | None = None) -> Translated:

@@ -59,11 +59,13 @@ _SHAPES = {
     ("solid", 10): ("tetrahedron", 2),
     ("solid", 20): ("hexahedron", 2),
 }
+_SHELLS = {"3": ("triangle", 1), "4": ("quadrilateral", 1), "8": ("quadrilateral", 2)}
 _MODELS = {"CPE": "plane strain", "CPS": "plane stress", "CAX": "axisymmetric", "C3D": "solid"}
 
 _REFUSED = (
-    (r"S[0-9]|S3|STRI|SAX", "shells are not read from decks yet (fx.Shell in Python); use "
-     "continuum shells (SC8R) or solid elements (C3D20R)"),
+    (r"STRI65|S6", "second-order triangles lock on curved shells; use S8R, S4R or S3"),
+    (r"S9R", "it is not available; use S8R, whose centre nodes are added, or S4R"),
+    (r"SAX", "axisymmetric shells are not available; use axisymmetric solids (CAX)"),
     (r"SC6", "prisms have facets of two kinds, which DOLFINx meshes do not; use SC8R"),
     (r"CSS8", "solid shells are not available; use solid elements such as C3D8I"),
     (r"C3D(6|15|18)", "prisms have facets of two kinds, which DOLFINx meshes do not; use hexahedra "
@@ -84,12 +86,6 @@ _REFUSED = (
 """Patterns of element types that are refused, with what would help: the one place to look."""
 
 
-_STACKED = (
-    "the continuum shell is replaced by one of second order with 27 nodes; all elements of the "
-    "deck are raised to the second order"
-)
-
-
 @dataclass(frozen=True)
 class ElementType:
     """An element type of a deck.
@@ -98,7 +94,7 @@ class ElementType:
         name: As the deck calls it.
         cell: Cell shape.
         order: 1 or 2.
-        model: Kinematic model: plane strain, plane stress, axisymmetric or solid.
+        model: Kinematic model: plane strain, plane stress, axisymmetric, solid or shell.
         n_nodes: Nodes the deck gives for each element.
         notes: What is computed in another way than the type says.
         stacked: Whether it is a continuum shell: plies lie from its face S1 to its face S2.
@@ -115,7 +111,17 @@ class ElementType:
     @property
     def gdim(self) -> int:
         """Dimension of space."""
+        return 3 if self.model in ("solid", "shell") else 2
+
+    @property
+    def tdim(self) -> int:
+        """Dimension of the cells."""
         return 3 if self.model == "solid" else 2
+
+    @property
+    def shell(self) -> bool:
+        """Whether it is a shell on a surface."""
+        return self.model == "shell"
 
     @property
     def serendipity(self) -> bool:
@@ -130,7 +136,12 @@ def element_type(name: str) -> ElementType | str:
         name: In capitals, e.g. "C3D20R".
     """
     if name in ("SC8", "SC8R"):
-        return ElementType(name, "hexahedron", 1, "solid", 8, (_STACKED,), stacked=True)
+        return ElementType(name, "hexahedron", 1, "solid", 8, stacked=True)
+    shell = re.fullmatch(r"S([348])(R?)(5?)(S?W?)", name)
+    if shell or name == "STRI3":
+        cell, order = _SHELLS[shell[1] if shell else "3"]
+        return ElementType(name, cell, order, "shell", int(shell[1]) if shell else 3,
+                           _shell_notes(cell, order))  # fmt: skip
     match = re.fullmatch(r"(CPE|CPS|CAX|C3D)(\d+)([A-Z]*)", name)
     if match and match[1] in _MODELS:
         family, n = match[1], int(match[2])
@@ -146,7 +157,7 @@ def element_type(name: str) -> ElementType | str:
         return "temperatures, pores and voltages are not computed; use the plain stress element"
     return (
         "this type is not known; plane (CPE, CPS), axisymmetric (CAX) and solid (C3D) stress "
-        "elements of 3 to 20 nodes are"
+        "elements of 3 to 20 nodes and shells (S3, S4R, S8R, SC8R) are"
     )
 
 
@@ -167,6 +178,19 @@ def _notes(cell: str, order: int, suffix: str) -> tuple[str, ...]:
     }
     notes = [words[letter] for letter in suffix]
     if order == 2 and cell in ("quadrilateral", "hexahedron"):
+        notes.append("centre nodes are added by the element's own shape functions")
+    return tuple(notes)
+
+
+def _shell_notes(cell: str, order: int) -> tuple[str, ...]:
+    """What is computed in another way in a shell."""
+    shape = f"{'first' if order == 1 else 'second'}-order {cell}s"
+    notes = [
+        f"the element is replaced by the seven-parameter shell of {shape}, whose director has no "
+        "rotation about the normal; transverse shear strains are tied, or integrated with reduced "
+        "points in second order, and the other strains are integrated fully"
+    ]
+    if order == 2:
         notes.append("centre nodes are added by the element's own shape functions")
     return tuple(notes)
 

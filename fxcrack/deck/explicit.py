@@ -51,7 +51,7 @@ def explicit_step(card: Card, step: Family, start: float, report: Report) -> tup
             "the largest increment is left out: increments are the stable one throughout", card
         )
     options |= _mass_scaling(step, report)
-    _bulk_viscosity(step)
+    _bulk_viscosity(card, step, report)
     return length, Explicit(
         until=Time(start + length),
         rows=_rows(step, length),
@@ -59,15 +59,26 @@ def explicit_step(card: Card, step: Family, start: float, report: Report) -> tup
     )
 
 
-def _bulk_viscosity(step: Family) -> None:
+def _bulk_viscosity(procedure: Card, step: Family, report: Report) -> None:
+    """Say that it is left out; more than the default, which is there without the card, is refused.
+
+    Raises:
+        DeckError: It is larger than the default.
+    """
     card = step.first("BULKVISCOSITY")
-    if card is None:
-        return
-    given = card.rows()
+    given = [] if card is None else card.rows()
     linear = given[0].number(0, 0.06) if given else 0.06
     quadratic = given[0].number(1, 1.2) if given else 1.2
+    if card is not None and (linear > 0.06 or quadratic > 1.2):
+        card.fail(
+            "bulk viscosity above the default of 0.06 and 1.2 is not available; leave the card out"
+        )
     if linear or quadratic:
-        card.fail("bulk viscosity is not available; write 0., 0. on its data line")
+        report.replace(
+            f"the bulk viscosity of {linear:g} and {quadratic:g}, which damps waves as short as "
+            "the elements, is left out",
+            card or procedure,
+        )
 
 
 def _mass_scaling(step: Family, report: Report) -> dict[str, object]:

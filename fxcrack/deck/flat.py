@@ -266,7 +266,7 @@ class Flat:
         """Nodes of every face of every cell, and how many cells have each; by cell, then face."""
         if self._faces is None:
             table = face_nodes(self.kind.cell, self.kind.order)
-            n_corners = 2 if self.kind.gdim == 2 else {"tetrahedron": 3}.get(self.kind.cell, 4)
+            n_corners = 2 if self.kind.tdim == 2 else {"tetrahedron": 3}.get(self.kind.cell, 4)
             rows = self.cells[:, table]
             corners = np.sort(rows[:, :, :n_corners].reshape(-1, n_corners), axis=1)
             self._faces = rows, _repetitions(corners).reshape(len(self.cells), -1)
@@ -285,6 +285,8 @@ class Flat:
             DeckError: The cells have no such face, or it lies inside the body.
         """
         rows, count = self._face_ids
+        if self.kind.shell:
+            card.fail("faces of shells are SPOS and SNEG of a *SURFACE; load it by *DSLOAD", index)
         if not 1 <= face <= rows.shape[1]:
             card.fail(f"a {self.kind.cell} has faces 1 to {rows.shape[1]}, not {face}", index)
         inside = count[cells, face - 1] > 1
@@ -320,6 +322,8 @@ class Flat:
         """Nodes of the facets of a surface of a space; rows as of :meth:`faces`."""
         card = surface.card
         kind = card.word("TYPE", "ELEMENT")
+        if self.kind.shell:
+            return np.asarray(self.cells[self._side_of(place, surface)[0]])
         if kind == "NODE":
             return self._node_surface(card, place)
         if kind != "ELEMENT":
@@ -348,6 +352,49 @@ class Flat:
         ids = row_ids(np.sort(rows, axis=1))
         return np.asarray(rows[np.sort(np.unique(ids, return_index=True)[1])])
 
+    def shell_side(self, card: Card, name: str, index: int | None = None) -> tuple[Ints, str]:
+        """Shell elements of a surface, and "top" or "bottom".
+
+        Raises:
+            DeckError: There is no such surface, or it is no side of shells.
+        """
+        place, found = self._resolve(card, name, "surfaces", index)
+        assert isinstance(found, SurfaceDef)
+        return self._side_of(place, found)
+
+    def _side_of(self, place: str, surface: SurfaceDef) -> tuple[Ints, str]:
+        card = surface.card
+        if card.word("TYPE", "ELEMENT") != "ELEMENT":
+            card.fail("a surface of nodes has no side of a shell; name elements with SPOS or SNEG")
+        parts, sides = [], set()
+        for row in card.need_rows("element set, SPOS or SNEG"):
+            side = row.text(1).upper()
+            if side not in ("SPOS", "SNEG"):
+                row.fail(
+                    f"'{row.text(1)}' is no side of a shell; give SPOS or SNEG behind the elements"
+                )
+            sides.add("top" if side == "SPOS" else "bottom")
+            parts.append(self._in(card, place, row.text(0), row.index, "elsets"))
+        if len(sides) > 1:
+            card.fail("the surface has SPOS and SNEG sides; make it two surfaces")
+        return distinct(np.concatenate(parts)), sides.pop()
+
+    def _edge_nodes(self, place: str, card: Card) -> Ints:
+        """Nodes of a surface of shells by sides, edges E1, E2, ..., or whole elements."""
+        n = 3 if self.kind.cell == "triangle" else 4
+        table = face_nodes(self.kind.cell, self.kind.order)
+        parts = []
+        for row in card.need_rows("element set, side or edge"):
+            cells = self._in(card, place, row.text(0), row.index, "elsets")
+            side = row.text(1).upper()
+            if side[:1] == "E" and side[1:].isdigit() and 1 <= int(side[1:]) <= n:
+                parts.append(self.cells[cells][:, table[int(side[1:]) - 1]].ravel())
+            elif side in ("", "SPOS", "SNEG"):
+                parts.append(self.cells[cells].ravel())
+            else:
+                row.fail(f"'{row.text(1)}' is no side and no edge of a shell")
+        return distinct(np.concatenate(parts))
+
     def _in(self, card: Card, place: str, name: str, index: int, kind: str) -> Ints:
         """Members of a set that a card inside a space names."""
         if place:
@@ -360,12 +407,19 @@ class Flat:
             card, name, index
         )  # fmt: skip
 
+    def surface_is_nodes(self, card: Card, name: str) -> bool:
+        """Whether a surface is one of nodes."""
+        _, found = self._resolve(card, name, "surfaces", None)
+        return bool(found.card.word("TYPE") == "NODE")
+
     def surface_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
         """Nodes of a surface of faces or of nodes, ascending."""
         place, found = self._resolve(card, name, "surfaces", index)
         assert isinstance(found, SurfaceDef)
         if found.card.word("TYPE") == "NODE":
             return self._surface_node_list(found.card, place)
+        if self.kind.shell:
+            return self._edge_nodes(place, found.card)
         return distinct(self.facets_of(place, found).ravel())
 
     def _surface_node_list(self, card: Card, place: str) -> Ints:
@@ -391,6 +445,17 @@ class Flat:
                 "element faces, TYPE=ELEMENT"
             )
         return np.asarray(rows)
+
+    def node_names(self, nodes: Ints) -> tuple[str, ...]:
+        """Names of nodes in the deck, "12" or "instance.12"; "-" of nodes that were added."""
+        out = ["-"] * len(nodes)
+        for placed in self.placed.values():
+            labels = placed.space.nodes.labels
+            prefix = f"{placed.space.name}." if placed.space is not self.model.root else ""
+            mine = (nodes >= placed.first_node) & (nodes < placed.first_node + len(labels))
+            for i in np.flatnonzero(mine):
+                out[i] = f"{prefix}{int(labels[nodes[i] - placed.first_node])}"
+        return tuple(out)
 
     # -- sets for supports ---------------------------------------------------------------
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base import log
+from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import InputError, did_you_mean
 from fxcrack.deck.cards import Card, DeckError, Row, key, label
 from fxcrack.deck.everywhere import Everywhere
@@ -70,6 +71,7 @@ class GeneralContact:
 
     Attributes:
         pairs: The pairs.
+        slave_nodes: Nodes of the slave surfaces that may come apart by titles, once they are built.
 
     Raises:
         DeckError: A card cannot be read, or the steps are not explicit.
@@ -80,6 +82,7 @@ class GeneralContact:
     ) -> None:
         self._flat, self._groups, self._report = flat, groups, report
         self.pairs: list[GeneralPair] = []
+        self.slave_nodes: dict[str, Ints] = {}
         self._clearances: dict[str, Card] = {}
         self._everywhere: Card | None = None
         self._default: str | None = None
@@ -230,8 +233,7 @@ class GeneralContact:
     ) -> Interface:
         flat, card = self._flat, pair.row.card
         facets = [
-            self._groups.facets(name, flat.surface(card, name, pair.row.index))
-            for name in (pair.slave, pair.master)
+            self._groups.surface(card, name, pair.row.index) for name in (pair.slave, pair.master)
         ]
         bonded: object = Everywhere(False)
         tolerance = None
@@ -305,6 +307,7 @@ class GeneralContact:
         if card.has("UNSTABLE GROWTH TOLERANCE", "VISCOSITY"):
             card.fail("UNSTABLE GROWTH TOLERANCE and VISCOSITY belong to quasi-static steps")
         slave = np.unique(self._flat.surface(pair.row.card, pair.slave, pair.row.index))
+        self.slave_nodes[interface.title] = slave
         criterion = read_criterion(card, self._flat, self._groups, nodal, slave, finite=finite)
         try:
             return Debond(interface, criterion)

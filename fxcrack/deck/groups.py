@@ -8,6 +8,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import MeshError
+from fxcrack.continuum.face import Face
 from fxcrack.deck.cards import Card, DeckError
 from fxcrack.deck.flat import Flat
 from fxcrack.mesh.raw import RawGroup, RawMesh, check_shapes
@@ -39,7 +40,8 @@ class Groups:
         if kind == "nsets":
             self.support(card, name, self._flat.nodes(card, name))
         elif kind == "surfaces":
-            self.facets(name, self._flat.surface(card, name))
+            if not self._flat.kind.shell:
+                self.facets(name, self._flat.surface(card, name))
         else:
             cells = self._flat.elements(card, name)
             if len(cells):
@@ -78,6 +80,22 @@ class Groups:
         """Name of a group of facets, rows of :meth:`Flat.faces`."""
         return self._add(name, "facets", words, rows)
 
+    def surface(self, card: Card, name: str, index: int | None = None) -> str | Face:
+        """Group of facets of a surface of the deck, or the side of shells that it is.
+
+        Args:
+            card: For messages.
+            name: Of the surface.
+            index: Data line, for messages.
+
+        Raises:
+            DeckError: There is no such surface, or it is none of facets.
+        """
+        if self._flat.kind.shell:
+            cells, side = self._flat.shell_side(card, name, index)
+            return Face(self.cells(name, cells, words="surface"), side)
+        return self.facets(name, self._flat.surface(card, name, index))
+
     def cells(self, name: str, cells: Ints, *, words: str = "elements") -> str:
         """Name of a group of cells."""
         return self._add(name, "cells", words, cells)
@@ -90,7 +108,7 @@ class Groups:
         """
         flat = self._flat
         number = np.cumsum(flat.used) - 1
-        gdim = flat.kind.gdim
+        gdim, tdim = flat.kind.gdim, flat.kind.tdim
         raw = RawMesh(
             flat.kind.cell,
             flat.kind.order,
@@ -106,5 +124,5 @@ class Groups:
                 raw.cell_groups[name] = members
             else:
                 rows = members[:, None] if kind == "nodes" else members
-                raw.groups[name] = RawGroup(0 if kind == "nodes" else gdim - 1, number[rows])
+                raw.groups[name] = RawGroup(0 if kind == "nodes" else tdim - 1, number[rows])
         return raw

@@ -55,8 +55,8 @@ _READ = {
     # sections, materials
     "SOLID SECTION": ("ELSET, MATERIAL, ORIENTATION", "CONTROLS"),
     "SHELL SECTION": (
-        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON",
-        "CONTROLS",
+        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON, OFFSET, SYMMETRIC",
+        "CONTROLS, SECTION INTEGRATION, LAYUP",
     ),
     "ORIENTATION": ("NAME, SYSTEM, DEFINITION", ""),
     "MATERIAL": ("NAME", "SRANGE, RTOL"),
@@ -89,6 +89,7 @@ _READ = {
     "TIE": ("NAME, ADJUST, TYPE, POSITION TOLERANCE", "NO ROTATION, NO THICKNESS"),
     "COUPLING": ("CONSTRAINT NAME, REF NODE, SURFACE", ""),
     "KINEMATIC": ("", ""),
+    "DISTRIBUTING": ("WEIGHTING METHOD", ""),
     "EQUATION": ("", ""),
     "RIGID BODY": ("REF NODE, ELSET, TIE NSET, PIN NSET, NSET", "POSITION"),
     "INITIAL CONDITIONS": ("TYPE, NORMAL", ""),
@@ -118,8 +119,8 @@ _READ = {
     "DSLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
     "TEMPERATURE": ("AMPLITUDE, OP", ""),
     "DEBOND": (
-        "SLAVE, MASTER, SECONDARY, MAIN, DEBONDING FORCE, TIME INCREMENT",
-        "FREQUENCY, OUTPUT",
+        "SLAVE, MASTER, SECONDARY, MAIN, DEBONDING FORCE, TIME INCREMENT, FREQUENCY",
+        "OUTPUT",
     ),
     "FRACTURE CRITERION": (
         "TYPE, DISTANCE, NSET, DEPENDENCIES, MIXED MODE BEHAVIOR, NODAL ENERGY RATE, SYMMETRY, "
@@ -144,7 +145,9 @@ _OUTPUT = (
 
 _NUMERICS = "CONTACT CONTROLS, SECTION CONTROLS, HOURGLASS STIFFNESS, SOLVER CONTROLS"
 
-_SHELLS = "these shells are not available; use continuum shells (SC8R) or solid elements (C3D20R)"
+_SHELLS = (
+    "it is not available; shells (S4R, S8R, SC8R) have *SHELL SECTION with a thickness or plies"
+)
 _USER = (
     "user subroutines cannot be run; use a material that fxcrack has (ELASTIC, PLASTIC, "
     "HYPERELASTIC with NEO HOOKE)"
@@ -192,11 +195,7 @@ _REFUSED = {
     "DASHPOT": "dashpots are not available; use *DAMPING of the material",
     "CONNECTOR SECTION": "connectors are not available; hold or load the bodies themselves",
     "MPC": "multi-point constraints are not available; prescribe the displacements",
-    "DISTRIBUTING": (
-        "a coupling that distributes a load is not available; load the surface by *DSLOAD with "
-        "TRVEC, or use *KINEMATIC with a reference node whose motion is prescribed"
-    ),
-    "DISTRIBUTING COUPLING": "load the surface itself by *DSLOAD with TRVEC",
+    "DISTRIBUTING COUPLING": "write *COUPLING with *DISTRIBUTING",
     "KINEMATIC COUPLING": "write *COUPLING with *KINEMATIC",
     "EMBEDDED ELEMENT": "embedded elements are not available; mesh them into the body",
     "PRE-TENSION SECTION": "prescribe the displacement of the bolt's end instead",

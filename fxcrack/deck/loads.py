@@ -2,24 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
     AmplitudeLike,
     BodyForce,
+    Field,
     Load,
     PointForce,
+    PointMoment,
     Pressure,
     Traction,
 )
 from fxcrack.deck.cards import Card, Row, key, label, squeeze
+from fxcrack.deck.distributing import Distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.report import Report
+from fxcrack.deck.thermal import NodalField
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track
 
 _BODY = {"BX": 0, "BY": 1, "BZ": 2}
@@ -82,13 +87,23 @@ class Loads:
         amplitudes: Its amplitudes.
         report: Takes notes.
         finite: Whether bodies turn far (NLGEOM).
+        distributed: Couplings by their reference nodes, whose loads they distribute.
     """
 
-    def __init__(self, flat: Flat, amplitudes: Amplitudes, report: Report, finite: bool) -> None:
+    def __init__(
+        self,
+        flat: Flat,
+        amplitudes: Amplitudes,
+        report: Report,
+        *,
+        finite: bool,
+        distributed: Mapping[int, Distributing],
+    ) -> None:
         self._flat = flat
         self._amplitudes = amplitudes
         self._report = report
         self._finite = finite
+        self._distributed = distributed
         self._entries: dict[tuple[str, ...], LoadEntry] = {}
         self._past: list[Period] = []
 
@@ -146,9 +161,12 @@ class Loads:
         if word in ("P", "HP") or (word[:1] == "P" and word[1:].isdigit()) or (
             word[:2] == "HP" and word[2:].isdigit()
         ):  # fmt: skip
-            if card.keyword == "DLOAD" and word in ("P", "HP"):
-                row.fail("load type P needs the face of solid elements: P1, P2, ...")
-            entry.follows = self._finite
+            if card.keyword == "DLOAD" and (word in ("P", "HP")) != self._flat.kind.shell:
+                row.fail(
+                    "load type P needs the face of solid elements: P1, P2, ...; shells have P and "
+                    "HP alone"
+                )
+            entry.follows = self._finite and not (self._flat.kind.shell and follower == "NO")
             if word[:2] == "HP":
                 entry.zero = (row.number(3), row.number(4))
                 if entry.zero[0] == entry.zero[1]:
@@ -178,17 +196,24 @@ class Loads:
         if row.card.has("FOLLOWER"):
             row.fail("forces that turn with the body are not available")
         dof = row.whole(1)
-        if not 1 <= dof <= self._flat.kind.gdim:
+        nodes = self._flat.nodes(row.card, row.text(0), row.index)
+        if len(nodes) == 1 and int(nodes[0]) in self._distributed:
+            if dof not in ((1, 2, 6) if self._flat.kind.gdim == 2 else (1, 2, 3, 4, 5, 6)):
+                row.fail(f"component {dof} of a load on a reference node is not available")
+            return self._force_entry(row, dof)
+        if not 1 <= dof <= (6 if self._flat.kind.shell else self._flat.kind.gdim):
             row.fail(
                 f"component {dof} of a force is not available on {self._flat.kind.name} elements, "
                 f"whose nodes have {self._flat.kind.gdim} displacements and no rotations"
             )
-        nodes = self._flat.nodes(row.card, row.text(0), row.index)
         if not self._flat.used[nodes].all():
             row.fail(
                 f"'{row.text(0)}' has a node without elements, on which no force can act; load the "
                 "nodes of the body"
             )
+        return self._force_entry(row, dof)
+
+    def _force_entry(self, row: Row, dof: int) -> tuple[tuple[str, ...], float]:
         mark = ("CLOAD", key(row.text(0)), str(dof))
         entry = LoadEntry(row, "CLOAD", label(row.text(0)), str(dof))
         self._entries.setdefault(mark, self._started(entry))
@@ -230,19 +255,52 @@ class Loads:
             if entry.kind == "CLOAD" and not entry.track.zero:
                 value, amplitude = entry.track.amplitude()
                 mark = (entry.name, repr(amplitude))
-                zero = np.zeros(self._flat.kind.gdim)
+                zero = np.zeros(6)
                 force = found.setdefault(mark, (entry, amplitude, zero))[2]
                 force[int(entry.type) - 1] += value
         out: list[Load] = []
         for (name, _), (entry, amplitude, force) in found.items():
             nodes = self._flat.nodes(entry.row.card, name, entry.row.index)
+            if len(nodes) == 1 and int(nodes[0]) in self._distributed:
+                coupling = self._distributed[int(nodes[0])]
+                out.append(self._distribute(coupling, entry, amplitude, force, groups))
+                continue
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
+            moment, force = force[3:], force[: self._flat.kind.gdim]
             axes = "".join("xyz"[i] for i in np.flatnonzero(force))
             title = name if alone else f"{name}.{axes}"
-            total = tuple((force * len(nodes)).tolist())
-            out.append(PointForce(where, total, amplitude, title))
+            if axes:
+                total = tuple((force * len(nodes)).tolist())
+                out.append(PointForce(where, total, amplitude, title))
+            if moment.any():
+                total = tuple((moment * len(nodes)).tolist())
+                out.append(PointMoment(where, total, amplitude, f"{title}.moment"))
         return out
+
+    def _distribute(
+        self,
+        coupling: Distributing,
+        entry: LoadEntry,
+        amplitude: AmplitudeLike,
+        load: Array,
+        groups: Groups,
+    ) -> Load:
+        """A load on the reference node as forces on the nodes of its surface."""
+        flat, gdim = self._flat, self._flat.kind.gdim
+        if self._finite and coupling.turns(load[:3], load[3:]):
+            entry.row.fail(
+                "with NLGEOM a coupling distributes forces through the centre of its surface only, "
+                "neither moments nor forces beside it; write NLGEOM=NO"
+            )
+        forces = coupling.forces(entry.row, load[:3], load[3:], gdim) * len(coupling.nodes)
+        where = groups.nodes(coupling.name, coupling.nodes, words="coupling")
+        x = flat.points[coupling.nodes][:, :gdim]
+        fields: list[Field] = []
+        for values in forces.T:
+            same = np.ptp(values) <= 1e-14 * np.abs(forces).max()
+            fields.append(float(values.mean()) if same else NodalField(x, values))
+        return PointForce(where, tuple(fields), amplitude, entry.name)
 
     def _of(
         self,
@@ -262,13 +320,20 @@ class Loads:
             return new
 
         if entry.kind == "DSLOAD":
-            where = groups.facets(entry.name, flat.surface(card, entry.name, entry.row.index))
+            where = groups.surface(card, entry.name, entry.row.index)
+            if entry.type == "TRVEC" and flat.kind.shell:
+                self._report.replace(
+                    "the traction acts on the face of the shell, not on its reference surface", card
+                )
             return [self._on_facets(entry, where, value, amplitude, title(entry.name))]
         cells = (
             flat.elements(card, entry.name, entry.row.index)
             if entry.name
             else np.arange(len(flat.cells))
         )
+        if entry.type in ("P", "HP"):  # of shells: towards the positive side
+            side = Face(groups.cells(entry.name or "all shells", cells), "bottom")
+            return [self._on_facets(entry, side, value, amplitude, title(entry.name or "P"))]
         if entry.type.lstrip("H")[:1] == "P":
             face = int(entry.type.lstrip("HP"))
             rows = flat.faces(card, cells, face, entry.row.index)
@@ -291,14 +356,14 @@ class Loads:
         return [BodyForce(tuple(force.tolist()), body, amplitude, title(f"{name}.{entry.type}"))]
 
     def _on_facets(
-        self, entry: LoadEntry, where: str, value: float, amplitude: AmplitudeLike, name: str
+        self, entry: LoadEntry, where: str | Face, value: float, amplitude: AmplitudeLike, name: str
     ) -> Load:
         if entry.type == "TRVEC":
             traction = tuple(value * d for d in entry.direction[: self._flat.kind.gdim])
             return Traction(where, traction, amplitude, name)
         if entry.type[:2] == "HP":
             # from the level where it is 0 to that where it has its value
-            axis = self._flat.kind.gdim - 1
+            axis = 1 if self._flat.kind.gdim == 2 else 2
             shape = Hydrostatic(axis, *entry.zero)
             field = _Scaled(value, shape)
             return Pressure(where, field, amplitude, name, entry.follows)

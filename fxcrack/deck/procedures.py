@@ -35,11 +35,13 @@ class DeckStep:
         name: Its name in the deck.
         step: What :meth:`fxcrack.Scene.run` takes.
         grow: Names of the interfaces that may grow in it.
+        frequency: Increments between two outputs of their crack tips, 0 for none.
     """
 
     name: str
     step: Static | Cycles | Explicit
     grow: tuple[str, ...] = ()
+    frequency: dict[str, int] = field(default_factory=dict)
 
 
 @dataclass(eq=False)

@@ -9,9 +9,10 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum_shell import ContinuumShell
-from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, PlaneStress, Solid
+from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.materials import Isotropic, Material, NeoHookean, Orthotropic, Plastic
+from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.deck.cards import Card, DeckError, Row, key
 from fxcrack.deck.flat import Flat
@@ -19,6 +20,7 @@ from fxcrack.deck.generators import axis_rotation
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
+from fxcrack.deck.shells import cell_normals, is_isotropic, section_axis, surface_section
 from fxcrack.deck.spaces import Space
 
 Frame = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -37,8 +39,8 @@ class Sections:
         rayleigh: Damping by mass and stiffness.
     """
 
-    materials: dict[str, Material]
-    model: Model
+    materials: dict[str, Material | Section]
+    model: Model | Shell
     zero: float | None
     rayleigh: tuple[float, float]
 
@@ -64,6 +66,7 @@ class _Sections:
         owner = np.full(len(flat.cells), -1, dtype=np.int64)
         kinds: list[tuple[str | Card, Frame, float]] = []
         cards: list[tuple[Card, str]] = []
+        spaces: list[Space] = []
         for place, placed in flat.placed.items():
             for card in placed.space.sections:
                 cells = flat.in_space(place, card, card.text("ELSET"))
@@ -76,6 +79,7 @@ class _Sections:
                 )
                 if kind not in kinds:
                     kinds.append(kind)
+                    spaces.append(placed.space)
                     prefix = f"{placed.space.name}." if place else ""
                     cards.append((card, prefix + card.text("ELSET")))
                 i = kinds.index(kind)
@@ -102,11 +106,14 @@ class _Sections:
             cards[used[1]][0].fail(
                 "the materials have different *DAMPING; all bodies must have the same"
             )
-        materials = {}
+        materials: dict[str, Material | Section] = {}
         for i in used:
             name = self._groups.cells(cards[i][1], np.flatnonzero(owner == i), words="elements")
             what, frame, _ = kinds[i]
-            if isinstance(what, Card):
+            if isinstance(what, Card) and flat.kind.shell:
+                cells = np.flatnonzero(owner == i)
+                materials[name] = self._surface_section(what, cells, spaces[i])
+            elif isinstance(what, Card):
                 materials[name] = self._shell(what, name, np.flatnonzero(owner == i), frame)
             else:
                 materials[name] = self._material(self._materials[what], frame)
@@ -143,43 +150,67 @@ class _Sections:
             rows[0].fail(f"the thickness {value:g} must be positive")
         return value
 
-    def _model(self, thickness: float) -> Model:
+    def _model(self, thickness: float) -> Model | Shell:
         kind = self._flat.kind.model
         if kind == "plane strain":
             return PlaneStrain(thickness)
         if kind == "plane stress":
             return PlaneStress(thickness)
+        if kind == "shell":
+            return Shell()
         return Axisymmetric() if kind == "axisymmetric" else Solid()
 
     # -- orientation ---------------------------------------------------------------------
 
     def _frame(self, section: Card, space: Space) -> Frame:
         """Axes of the material in global components."""
-        axes = np.eye(3)
-        if section.has("ORIENTATION"):
-            name = section.text("ORIENTATION")
-            root = self._flat.model.root
-            card = space.orientations.get(key(name)) or root.orientations.get(key(name))
-            if card is None:
-                section.fail(f"there is no orientation '{name}'; define it by *ORIENTATION")
-            axes = _axes(card)
-        axes = axes @ space.rotation.T
+        card = self._orientation(section, space)
+        axes = (np.eye(3) if card is None else _axes(card)) @ space.rotation.T
         axes[np.abs(axes) < 1e-15] = 0.0
         first, second = (tuple(float(c) for c in row) for row in axes[:2])
         return first, second  # type: ignore[return-value]
+
+    def _orientation(self, section: Card, space: Space) -> Card | None:
+        if not section.has("ORIENTATION"):
+            return None
+        name = section.text("ORIENTATION")
+        root = self._flat.model.root
+        card = space.orientations.get(key(name)) or root.orientations.get(key(name))
+        if card is None:
+            section.fail(f"there is no orientation '{name}'; define it by *ORIENTATION")
+        return card
+
+    # -- conventional shells -------------------------------------------------------------
+
+    def _surface_section(self, card: Card, cells: Ints, space: Space) -> Section:
+        """The section of shells on a surface."""
+        made = [self._material(self._materials[m], _GLOBAL) for m in self._ply_materials(card)]
+        given = self._orientation(card, space)
+        orientation = None
+        if given is not None:
+            rows = given.rows()
+            about = rows[1].whole(0, 1) - 1 if len(rows) > 1 else 0
+            orientation = _axes(given) @ space.rotation.T, about
+        normals = cell_normals(self._flat, cells)
+        axis = section_axis(card, orientation, normals, isotropic=is_isotropic(made))
+        if card.has("POISSON"):
+            self._report.replace(
+                "POISSON is left out: the strain of the thickness is computed", card
+            )
+        return surface_section(card, made, axis)
 
     # -- continuum shells ----------------------------------------------------------------
 
     def _check_elements(self, card: Card, cells: Ints, space: Space) -> None:
         """Refuse a shell section of solid elements and a solid section of continuum shells."""
-        stacked = [b for b in space.elements.values() if b.kind.stacked]
+        stacked = [b for b in space.elements.values() if b.kind.stacked or b.kind.shell]
         labels = np.concatenate([b.table.labels for b in stacked]) if stacked else np.zeros(0)
         placed = next(p for p in self._flat.placed.values() if p.space is space)
         shells = np.isin(cells, placed.cell_of(labels.astype(np.int64)))
         if card.keyword == "SHELLSECTION" and not shells.all():
-            card.fail("it needs continuum shell elements (SC8R); give *SOLID SECTION to others")
+            card.fail("it needs shell elements (S4R, SC8R); give *SOLID SECTION to others")
         if card.keyword == "SOLIDSECTION" and shells.any():
-            card.fail("continuum shell elements need *SHELL SECTION")
+            card.fail("shell elements need *SHELL SECTION")
 
     def _ply_materials(self, card: Card) -> list[str]:
         """Keys of the materials of a shell section's plies, bottom first."""
@@ -194,6 +225,8 @@ class _Sections:
 
     def _shell(self, card: Card, name: str, cells: Ints, frame: Frame) -> Material:
         """A continuum shell from the faces S1 of its elements to their faces S2."""
+        if card.has("OFFSET", "SYMMETRIC"):
+            card.fail("OFFSET and SYMMETRIC are not available in continuum shells; leave them out")
         if card.number("STACK DIRECTION", 3.0) != 3.0:
             card.fail("STACK DIRECTION must be 3: plies lie from face S1 to face S2")
         if card.has("POISSON"):
@@ -302,14 +335,17 @@ class _Sections:
         constants: list[tuple[float, ...]] = []
         knots: list[float] = []
         if kind == "LAMINA":
-            if self._flat.kind.model != "plane stress":
+            shell = self._flat.kind.shell
+            if self._flat.kind.model != "plane stress" and not shell:
                 card.fail(
-                    "TYPE=LAMINA is for plane stress; give ENGINEERING CONSTANTS for these elements"
+                    "TYPE=LAMINA is for plane stress and shells; give ENGINEERING CONSTANTS for "
+                    "these elements"
                 )
             for row in card.need_rows("E1, E2, nu12, G12, G13, G23"):
                 e1, e2, nu, g12 = (row.number(i) for i in range(4))
                 g13, g23 = row.number(4, g12), row.number(5, g12)
-                constants.append((e1, e2, e2, nu, nu, 0.0, g12, g13, g23))
+                # without nu13 and nu23 the thickness strain of a shell leaves the plies alone
+                constants.append((e1, e2, e2, nu, 0.0 if shell else nu, 0.0, g12, g13, g23))
                 knots.append(row.number(6, 0.0))
         elif kind in ("ENGINEERINGCONSTANTS", "ORTHOTROPIC"):
             flat = [x for row in card.need_rows("nine constants") for x in _padded(row)]

@@ -8,14 +8,16 @@ a reference that is free or loaded is refused.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.loads import Displacement
+from fxcrack.continuum.node_supports import Rotation, Support, Symmetry
 from fxcrack.deck.cards import Card, Row, label
+from fxcrack.deck.distributing import Distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track, combined
@@ -30,6 +32,7 @@ _NAMED = {
     "YASYMM": (1, 3, 5),
     "ZASYMM": (1, 2, 6),
 }
+AnySupport = Displacement | Support
 _DOFS = 6
 _AXES = "xyz"
 
@@ -63,7 +66,7 @@ class Link:
         card: The card it comes from.
         name: What it is called.
         nodes: Nodes that follow, shape (n,).
-        dof: Their component, 0, 1 or 2.
+        dof: Their component, 0, 1 or 2; 3, 4 or 5 of rotations of shells.
         terms: Reference node and component, and its factor per node, shape (n,).
     """
 
@@ -218,9 +221,24 @@ class Boundary:
         entries = self.owner[:, dof, node].astype(np.int64)
         return None if np.any(entries < 0) or not len(entries) else self.track(entries)
 
+    def check_free(self, distributed: Mapping[int, Distributing]) -> None:
+        """Refuse prescribed motion of nodes whose loads are distributed.
+
+        Raises:
+            DeckError: There is one.
+        """
+        for node, coupling in distributed.items():
+            if np.any(self.owner[:, :, node] >= 0):
+                entry = self.entries[int(self.owner[:, :, node].max())]
+                entry.card.fail(
+                    f"'{entry.name}' is the reference of the distributing coupling "
+                    f"'{coupling.name}', whose motion cannot be prescribed; use *KINEMATIC, or "
+                    "load it by *CLOAD"
+                )
+
     # -- the scene -----------------------------------------------------------------------
 
-    def displacements(self, groups: Groups) -> list[Displacement]:
+    def displacements(self, groups: Groups) -> list[AnySupport]:
         """Supports of the scene, one for each component of each group of nodes.
 
         Raises:
@@ -241,18 +259,75 @@ class Boundary:
                 mark = repr(amplitude)
                 amplitudes[mark] = amplitude
                 found.setdefault((where, mark), []).append((_AXES[dof], value))
-        return [
+        out: list[AnySupport] = [
             Displacement(where, **dict(parts), amplitude=amplitudes[mark])  # type: ignore[arg-type]
             for (where, mark), parts in found.items()
         ]
+        return out + (self._rotations(groups) if self.flat.kind.shell else [])
 
-    def link_displacements(self, links: Sequence[Link], groups: Groups) -> list[Displacement]:
+    def _rotations(self, groups: Groups) -> list[AnySupport]:
+        """Rotations of shells, one support for each amplitude of each group of nodes.
+
+        Raises:
+            DeckError: A rotation is prescribed in some steps only, or is large.
+        """
+        chosen = np.flatnonzero((self.owner[:, 3:] >= 0).any(axis=(0, 1)) & self.flat.used)
+        if not len(chosen):
+            return []
+        columns, which = np.unique(
+            self.owner[:, :, chosen].reshape(-1, len(chosen)), axis=1, return_inverse=True
+        )
+        out: list[AnySupport] = []
+        for i in range(columns.shape[1]):
+            owners = columns[:, i].reshape(-1, _DOFS).astype(np.int64)
+            nodes = chosen[which.ravel() == i]
+            tracks: dict[int, Track] = {}
+            for dof in range(_DOFS):
+                if np.all(owners[:, dof] >= 0):
+                    tracks[dof] = self.track(owners[:, dof])
+                elif dof >= 3 and np.any(owners[:, dof] >= 0):
+                    self.entries[int(owners[:, dof].max())].card.fail(
+                        f"rotation {dof + 1} is prescribed in some steps and free in others; "
+                        "fxcrack holds the same components in all steps"
+                    )
+            entry = self.entries[int(owners[:, 3:].max())]
+            where = groups.support(entry.card, entry.name, nodes, words="part")
+            out += self._rotation(where, tracks, entry.card)
+        return out
+
+    @staticmethod
+    def _rotation(where: str, tracks: dict[int, Track], card: Card) -> list[AnySupport]:
+        """Supports of the rotations among the tracks of one group of nodes."""
+        still = {dof for dof, track in tracks.items() if track.zero}
+        turning = {dof: track for dof, track in tracks.items() if dof >= 3 and not track.zero}
+        held = {dof for dof in still if dof >= 3}
+        for axis in range(3):  # planes of symmetry hold the director on curved shells as well
+            others = {3 + (axis + 1) % 3, 3 + (axis + 2) % 3}
+            if held == others and axis in still and not turning:
+                return [Symmetry(where, _AXES[axis], name=f"{where} symmetry")]
+        if not turning:
+            return [Rotation(where, **{_AXES[d - 3]: 0.0 for d in sorted(held)})]  # type: ignore[arg-type]
+        by_amplitude: dict[str, tuple[object, dict[str, float]]] = {}
+        for dof, track in turning.items():
+            value, amplitude = track.amplitude()
+            by_amplitude.setdefault(repr(amplitude), (amplitude, {}))[1][_AXES[dof - 3]] = value
+        if len(by_amplitude) > 1 and len(turning) + len(held) == 3:
+            card.fail("rotations with different amplitudes on one node are not available")
+        first = next(iter(by_amplitude.values()))[1]
+        first |= {_AXES[d - 3]: 0.0 for d in sorted(held)}
+        return [
+            Rotation(where, **values, amplitude=amplitude)  # type: ignore[arg-type]
+            for amplitude, values in by_amplitude.values()
+        ]
+
+    def link_displacements(self, links: Sequence[Link], groups: Groups) -> list[AnySupport]:
         """Supports that constraints stand for.
 
         Raises:
             DeckError: A reference is free in some step, or moves in several ways at once.
         """
-        out = []
+        out: list[AnySupport] = []
+        turns: dict[str, tuple[Link, dict[int, Track]]] = {}
         for link in links:
             tracks = []
             for node, dof, _ in link.terms:
@@ -268,6 +343,9 @@ class Boundary:
             factors = [f for _, _, f in link.terms]
             moving = [i for i, t in enumerate(tracks) if not t.zero]
             where = groups.support(link.card, link.name, link.nodes, words="constraint")
+            if link.dof >= 3:
+                turns.setdefault(where, (link, {}))[1][link.dof] = tracks[0]
+                continue
             axis = _AXES[link.dof]
             if not moving:
                 out.append(Displacement(where, **{axis: 0.0}))  # type: ignore[arg-type]
@@ -282,6 +360,8 @@ class Boundary:
                 )
                 continue
             out.append(self._turning(link, tracks, factors, moving, where))
+        for where, (link, of_dof) in turns.items():
+            out += self._rotation(where, of_dof, link.card)
         return out
 
     def _turning(

@@ -13,7 +13,6 @@ from fxcrack.continuum.materials import Plastic
 from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
 from fxcrack.deck.constraints import read_links
 from fxcrack.deck.contact import Contacts
-from fxcrack.deck.explicit_rules import check_density, check_explicit
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
@@ -22,8 +21,11 @@ from fxcrack.deck.model import Family, Model
 from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
 from fxcrack.deck.properties import Sections, read_sections
 from fxcrack.deck.report import Report
+from fxcrack.deck.rules import check_density, check_explicit, check_shells, density_of
+from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
+from fxcrack.deck.tips import NodeNames
 from fxcrack.deck.tracks import Amplitudes
 from fxcrack.deck.velocity import StartingVelocity, starting_velocity
 from fxcrack.effects import FiniteStrain
@@ -41,6 +43,7 @@ _IN_STEPS = frozenset(
 _IN_MODEL = frozenset(
     (
         *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
+        *("DISTRIBUTING",),
         *("EQUATION", "RIGIDBODY", "CLEARANCE", "NODALENERGYRATE", "CONTROLS", *GENERAL),
     )
 )
@@ -55,12 +58,14 @@ class Translated:
         steps: The steps.
         report: What was read and replaced.
         raw: The mesh.
+        nodes: Names of the slave nodes of interfaces that may come apart, by title.
     """
 
     arguments: dict[str, Any]
     steps: list[DeckStep]
     report: Report
     raw: RawMesh
+    nodes: dict[str, NodeNames]
 
 
 def translate(model: Model, report: Report, order: int | None = None) -> Translated:
@@ -74,21 +79,21 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     Raises:
         DeckError: Something is missing, contradicts itself or has no word here.
     """
-    spaces = [model.root, *model.instances.values()]
-    if any(block.kind.stacked for space in spaces for block in space.elements.values()):
-        order = 2
-    flat = Flat(model, order)
-    groups = Groups(flat)
-    cards = _model_cards(flat)
     procedures = read_procedures(model.steps, report)
     explicit = bool(procedures) and isinstance(procedures[0].step, Explicit)
+    flat = Flat(model, _order(model, report, order, explicit=explicit))
+    if flat.kind.shell:
+        check_normals(flat)
+    groups = Groups(flat)
+    cards = _model_cards(flat)
     _check_steps(model.steps, explicit=explicit)
     finite = _finite(model.steps, procedures, report)
     periods = [p.period for p in procedures]
     amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
     boundary = Boundary(flat, periods)
     boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
-    loads = Loads(flat, amplitudes, report, finite)
+    links, distributed = read_links(cards, flat)
+    loads = Loads(flat, amplitudes, report, finite=finite, distributed=distributed)
     temperatures = Temperatures(flat, report)
     temperatures.start(_initial(cards, "TEMPERATURE"))
     contacts = Contacts(
@@ -104,16 +109,19 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         thermal = [c for c in of_step if c.keyword == "TEMPERATURE"]
         temperatures.take(thermal, amplitudes, procedure.period)
         grow = contacts.take(number, of_step)
-        steps.append(DeckStep(family.name, procedure.step, tuple(grow)))
+        steps.append(DeckStep(family.name, procedure.step, tuple(grow), grow))
     sections = read_sections(flat, groups, report)
     _check_finite(finite, sections, model)
+    if flat.kind.shell:
+        check_shells(procedures, loads, temperatures)
     moving = [p for p in procedures if p.inertia is not None]
     if moving:
         check_density(moving[0], sections, model)
     if explicit:
         check_explicit(moving[0], flat, sections, loads, temperatures, boundary)
     supports = boundary.displacements(groups)
-    supports += boundary.link_displacements(read_links(cards, flat), groups)
+    supports += boundary.link_displacements(links, groups)
+    boundary.check_free(distributed)
     held = np.unique(
         np.concatenate(
             [np.zeros(0, dtype=np.int64), *(n for d in range(3) for _, n in boundary.histories(d))]
@@ -121,9 +129,13 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     )
     debonds, bonds = contacts.build(model.interactions, held)
     if explicit:
-        grow = [d.interface.title for d in debonds]
-        steps = [DeckStep(s.name, s.step, tuple(grow)) for s in steps]
-    densities = {n: getattr(m, "density", None) for n, m in sections.materials.items()}
+        titles = [d.interface.title for d in debonds]
+        steps = [
+            DeckStep(s.name, s.step, tuple(titles), dict.fromkeys(titles, s.step.rows))
+            for s in steps
+            if isinstance(s.step, Explicit)
+        ]
+    densities = {n: density_of(m) for n, m in sections.materials.items()}
     arguments: dict[str, Any] = {
         "materials": sections.materials,
         "model": sections.model,
@@ -142,7 +154,32 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     }
     raw = groups.raw_mesh()
     _tell(report, flat, arguments, steps)
-    return Translated(arguments, steps, report, raw)
+    nodes = {
+        title: NodeNames(flat.points[found], flat.node_names(found))
+        for title, found in contacts.slave_nodes().items()
+    }
+    return Translated(arguments, steps, report, raw, nodes)
+
+
+def _order(model: Model, report: Report, order: int | None, *, explicit: bool) -> int | None:
+    """Order of the elements: where there are continuum shells, 2 unless another is asked for."""
+    spaces = [model.root, *model.instances.values()]
+    blocks = [block for space in spaces for block in space.elements.values() if block.kind.stacked]
+    if not blocks or order is not None:
+        return order
+    if explicit:
+        report.replace(
+            "the continuum shell is replaced by one of first order with tied and enhanced strains "
+            "and full integration",
+            blocks[0].card,
+        )
+        return None
+    report.replace(
+        "the continuum shell is replaced by one of second order with 27 nodes; all elements of the "
+        "deck are raised to the second order (read_deck(..., order=1) or --order 1: 8 nodes)",
+        blocks[0].card,
+    )
+    return 2
 
 
 def _model_cards(flat: Flat) -> list[Card]:

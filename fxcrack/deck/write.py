@@ -306,7 +306,7 @@ class _Writer:
         out: list[str] = []
         if self.mesh is not None:
             for name, group in (
-                (slave, _group(interface.slave)), (master, _group(interface.master))
+                (slave, _group(pair.sides[0])), (master, _group(pair.sides[1]))
             ):  # fmt: skip
                 if name != group:
                     out += self._surface(name, self.mesh.groups[group][1])
@@ -364,7 +364,7 @@ class _Writer:
         """Nodes of the input at some slave nodes, in their order."""
         if self.mesh is None:
             return np.zeros(0, dtype=np.int64)
-        nodes = self._facet_nodes(self.mesh.groups[_group(pair.interface.slave)][1])
+        nodes = self._facet_nodes(self.mesh.groups[_group(pair.sides[0])][1])
         gdim = self.mesh.points.shape[1]
         _, at = cKDTree(self.mesh.points[nodes]).query(pair.surface.x[chosen][:, :gdim])
         return np.asarray(nodes[at])

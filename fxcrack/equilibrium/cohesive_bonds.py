@@ -183,6 +183,8 @@ class CohesiveBonds:
 
     def _leaves(self, bond: CohesiveBond, a: float, b: float) -> float:
         small = _EVENT * bond.final
+        if bond.fixed:
+            return np.inf
         if bond.largest is None:
             if b > bond.final - small:
                 return max(bond.final - a, 0.0) / (b - a) if b > a else 0.0

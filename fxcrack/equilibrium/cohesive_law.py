@@ -49,6 +49,8 @@ class CohesiveBond:
         where: Pair, and per component slave node and jump component, each of shape (k,), to find
             the bond again after a rebase.
         largest: w_max on the secant branch, ``None`` while the opening grows, length.
+        fixed: Whether it stays on its secant whatever its opening: the elastic rest of an element
+            through which the front has come in part, ``largest`` of ``final``.
     """
 
     components: Ints
@@ -57,6 +59,7 @@ class CohesiveBond:
     final: float
     where: tuple[int, Ints, Ints]
     largest: float | None = None
+    fixed: bool = False
 
     def opening(self, jump: Array) -> float:
         """Opening w at retained jumps of shape (n_retained,), length."""
@@ -64,6 +67,8 @@ class CohesiveBond:
 
     def force(self, opening: float) -> float:
         """Tensile force at an opening (length) on the present branch, force."""
+        if self.fixed:
+            return self.secant * opening
         if self.largest is None:
             return self._envelope(opening)
         return self._envelope(self.largest) + self.secant * (opening - self.largest)
@@ -73,10 +78,18 @@ class CohesiveBond:
 
     def taken(self, opening: float) -> float:
         """Energy the bond has taken up to an opening (length), the recoverable part included."""
+        if self.fixed:
+            return 0.5 * self.secant * opening**2
         most = opening if self.largest is None else self.largest
         back = most - opening
         given_back = back * (self._envelope(most) - 0.5 * self.secant * back)
         return self.strength * most * (1.0 - 0.5 * most / self.final) - given_back
+
+    def remaining(self, opening: float) -> float:
+        """Remaining part of the force at an opening (length)."""
+        if self.fixed and self.largest is not None:
+            return 1.0 - self.largest / self.final
+        return self.force(opening) / self.strength
 
     @property
     def secant(self) -> float:

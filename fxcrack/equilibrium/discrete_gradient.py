@@ -16,9 +16,14 @@ bond dissipates exactly the area F0 w_f/2 below its law, whatever the increment 
 stiffness does not limit the increment (discrete gradients: Gonzalez, J. Nonlinear Sci. 6, 1996). On
 the secant F is the mean of the forces at both ends; on the envelope, and in the increment in which
 the bond breaks, it is the smaller root of a quadratic.
+
+For few bonds calls of numpy cost ten times the arithmetic, so the same law is written twice: for
+arrays, and for one bond in plain numbers.
 """
 
 from __future__ import annotations
+
+from math import inf, sqrt
 
 import numpy as np
 
@@ -67,6 +72,56 @@ def softening_force(
     able &= free - compliance * last > final
     breaks = (free - compliance * envelope > final) | ((square <= 0.0) & able)
     return np.asarray(np.where(grows, np.maximum(np.where(breaks, last, envelope), 0.0), force))
+
+
+def force_of_one(
+    strength: float, final: float, low: float, top: float, change: float, compliance: float
+) -> float:
+    """Force of one bond over one increment: :func:`softening_force` in plain numbers."""
+    tiny = STIFFEST * final
+    slope = strength / final
+    at_top = strength * (1.0 - top / final)
+    secant = at_top / max(top, tiny)
+    free = low + change
+    force = secant * (low + 0.5 * change) / (1.0 + 0.5 * secant * compliance)
+    if low < 0.0 or free - compliance * force < 0.0:
+        force = _one_through_zero(secant, low, free, change, compliance)
+    if low < -tiny:
+        to_top = 0.5 * at_top * top / max(top - min(low, 0.0), max(top, tiny))
+    else:
+        to_top = 0.5 * at_top * (1.0 + (max(low, 0.0) / top if top > tiny else 1.0))
+    if free - compliance * to_top <= top:
+        return force
+    known = 0.5 * secant * (top * top - max(low, 0.0) ** 2)
+    known -= strength * top - 0.5 * slope * top * top
+    square = compliance - 0.5 * slope * compliance * compliance
+    linear = change + strength * compliance - slope * compliance * free
+    envelope = _one_root(square, linear, strength * free - 0.5 * slope * free * free + known)
+    whole = 0.5 * strength * final + known
+    breaks = free - compliance * envelope > final
+    if not breaks and square <= 0.0:
+        able = change > 0.0 and change * change >= 4.0 * compliance * whole
+        breaks = able and free - compliance * _one_root(compliance, change, whole) > final
+    return max(_one_root(compliance, change, whole) if breaks else envelope, 0.0)
+
+
+def _one_through_zero(
+    secant: float, low: float, free: float, change: float, compliance: float
+) -> float:
+    if low > 0.0:
+        energy = 0.5 * secant * low * low
+        bottom = sqrt(change * change + 4.0 * compliance * energy) - change
+        return 2.0 * energy / (bottom if bottom > 0.0 else inf)
+    if free > 0.0:
+        square = compliance + 0.5 * secant * compliance * compliance
+        linear = change + secant * compliance * free
+        return _one_root(square, linear, 0.5 * secant * free * free)
+    return 0.0
+
+
+def _one_root(a: float, b: float, c: float) -> float:
+    bottom = b + sqrt(max(b * b - 4.0 * a * c, 0.0))
+    return 2.0 * c / (bottom if bottom > 0.0 else inf)
 
 
 def _force_to_top(at_top: Array, low: Array, top: Array, tiny: Array) -> Array:

@@ -10,14 +10,18 @@ the factor takes half of S, and it grows without copies.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import lapack
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF
 
 _BLOCK = 64
-
+_MARGIN = 1e-2
+"""Part of what counts as zero that round-off really makes, at most (see ``round_off``); pivots
+between the two are real in bodies that are held."""
 _SMALL = 1e8
 """Pivots beyond this multiple of the round-off of their own diagonal entry are no round-off."""
 
@@ -25,13 +29,28 @@ _SMALL = 1e8
 class NotPositiveDefinite(ArithmeticError):
     """A pivot vanished: the unknown ``index`` is not restrained by anything.
 
+    Args:
+        index: Number of the unknown in S.
+        why: What else is known of it.
+
     Attributes:
         index: Number of the unknown in S.
+        why: What else is known of it, in words; empty if nothing.
     """
 
-    def __init__(self, index: int) -> None:
-        super().__init__(f"unknown {index} is not restrained")
-        self.index = index
+    def __init__(self, index: int, why: str = "") -> None:
+        super().__init__(f"unknown {index} is not restrained" + (f": {why}" if why else ""))
+        self.index, self.why = index, why
+
+
+class Restraint(Protocol):
+    """What holds the unknowns, told from the geometry of the bodies instead of from pivots."""
+
+    def find(self, free: Ints | None = None) -> str:
+        """What can move once some unknowns, shape (k,), are free, in words; empty if nothing."""
+
+    def warn(self, digits: float) -> None:
+        """Take note that round-off changes a pivot by this part of it."""
 
 
 class GrowingCholesky:
@@ -45,12 +64,14 @@ class GrowingCholesky:
         round_off: Round-off e of the entries of S, a number or one per unknown, shape (n,). A pivot
             is the energy v^t S v of the motion v of all free unknowns that it leaves least
             restrained, with v = 1 at its own; below sum e_i v_i^2 it counts as zero as well.
+        restraint: Who is asked before a positive pivot counts as zero; ``None`` for nobody.
     """
 
     def __init__(self, matrix: Array, *, floor: float = 1e-10) -> None:
         self._matrix = matrix
         self._floor = floor
         self.round_off: float | Array = 0.0
+        self.restraint: Restraint | None = None
         self._strips: list[Array] = []  # rows of L, 64 by 64, no wider than their last diagonal
         self._inverse: list[Array] = []
         self.free: Ints = np.zeros(0, dtype=np.int64)
@@ -184,12 +205,33 @@ class GrowingCholesky:
             raise NotPositiveDefinite(int(extra[info - 1]))
         pivots = np.diagonal(tile) ** 2
         round_off = np.broadcast_to(self.round_off, len(self._matrix))
-        bad = pivots <= np.maximum(self._floor * self._matrix[extra, extra], round_off[extra])
-        for j in np.flatnonzero(~bad & (pivots <= _SMALL * round_off[extra])):
-            bad[j] = pivots[j] <= self._round_off_of_pivot(tile, extra, int(j))
+        zero = np.maximum(self._floor * self._matrix[extra, extra], round_off[extra])
+        for j in np.flatnonzero((pivots > zero) & (pivots <= _SMALL * round_off[extra])):
+            zero[j] = max(zero[j], self._round_off_of_pivot(tile, extra, int(j)))
+        bad = pivots <= zero
         if np.any(bad):
-            raise NotPositiveDefinite(int(extra[np.argmax(bad)]))
+            self._judge(extra, pivots / zero, bad)
         return np.asarray(tile)
+
+    def _judge(self, extra: Ints, size: Array, bad: Bools) -> None:
+        """Refuse pivots that may be round-off, unless they belong to bodies that are held.
+
+        Args:
+            extra: Unknowns to be freed, shape (k,).
+            size: Their pivots over what counts as zero, shape (k,).
+            bad: Those in doubt, shape (k,).
+
+        Raises:
+            NotPositiveDefinite: Nothing holds one, or round-off may be all that is seen of it.
+        """
+        index = int(extra[np.argmax(bad)])
+        if self.restraint is None:
+            raise NotPositiveDefinite(index)
+        why = self.restraint.find(np.concatenate([self.free, extra]))
+        least = float(size[bad].min())
+        if why or least <= _MARGIN:
+            raise NotPositiveDefinite(index, why or HELD_BY_ROUND_OFF)
+        self.restraint.warn(_MARGIN / least)
 
     def _round_off_of_pivot(self, tile: Array, extra: Ints, j: int) -> float:
         """Round-off of the pivot of one of the unknowns of a factor of S*.
@@ -231,4 +273,4 @@ class GrowingCholesky:
         return first
 
 
-__all__ = ["GrowingCholesky", "NotPositiveDefinite"]
+__all__ = ["GrowingCholesky", "NotPositiveDefinite", "Restraint"]

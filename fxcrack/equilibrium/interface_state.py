@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import SolverError
-from fxcrack.condensation.mumps_schur import mumps_message
+from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF, mumps_message
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.coulomb import FrictionState, NodeStates
@@ -268,7 +268,10 @@ def _free_open(system: ContactSystem, pair: Pair, normals: Ints, free: Ints) -> 
         system.release(free)
     except NotPositiveDefinite as error:
         if not pair.interface.contact:
-            raise SolverError(mumps_message(-10, 0)) from error
+            if error.why == HELD_BY_ROUND_OFF:
+                raise SolverError(f"the open part cannot be opened: {error.why}") from error
+            why = f" ({error.why})" if error.why else ""
+            raise SolverError(f"{mumps_message(-10, 0)}{why}") from error
         normals = normals[normals >= 0]
         system.closed[normals] = True
         system.release(np.setdiff1d(free, normals))
@@ -286,13 +289,15 @@ def _arrays_of_bonds(bonds: list[CohesiveBond], finished: float) -> Arrays:
         "soft.strength": np.array([b.strength for b in bonds], dtype=float),
         "soft.final": np.array([b.final for b in bonds], dtype=float),
         "soft.largest": np.array([np.nan if b.largest is None else b.largest for b in bonds]),
+        "soft.fixed": np.array([b.fixed for b in bonds], dtype=bool),
         "soft.finished": np.array(finished),
     }
 
 
 def _bonds_of_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> list[CohesiveBond]:
-    law = (arrays[f"soft.{name}"].astype(float) for name in ("strength", "final", "largest"))
+    law = tuple(arrays[f"soft.{name}"].astype(float) for name in ("strength", "final", "largest"))
     rows, direction = arrays["soft.where"].astype(np.int64), arrays["soft.direction"].astype(float)
+    fixed = arrays.get("soft.fixed", np.zeros(len(law[0]), dtype=bool)).astype(bool)
     bonds = []
     for i, (strength, final, largest) in enumerate(zip(*law, strict=True)):
         mine = rows[:, 0] == i
@@ -301,6 +306,7 @@ def _bonds_of_arrays(arrays: Mapping[str, npt.NDArray[Any]]) -> list[CohesiveBon
             CohesiveBond(
                 np.full(len(nodes), -1), direction[mine], float(strength), float(final),
                 (int(pair[0]), nodes, local), None if np.isnan(largest) else float(largest),
+                bool(fixed[i]),
             )
         )  # fmt: skip
     return bonds

@@ -145,7 +145,9 @@ class JumpSystem:
         self, schur: Array, offset: Array | None, free: Ints, bonds: list[CohesiveBond]
     ) -> None:
         self.schur, self.offset = schur, offset
+        restraint = self.cholesky.restraint
         self.cholesky = GrowingCholesky(schur)
+        self.cholesky.restraint = restraint
         self._forward = np.zeros((0, len(self.load_columns) + (offset is not None)))
         self._unit = None
         self.soft.bonds = []

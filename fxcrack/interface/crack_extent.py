@@ -54,6 +54,10 @@ class CrackExtent:
             return self.area(tips) / self._front_length if self._front_length else 0.0
         return max((a for _, a in self.lengths()), default=0.0)
 
+    def over_front(self, area: float) -> float:
+        """Mean advance of the first front of a surface over an area, length."""
+        return area / self._front_length if self._front_length else 0.0
+
     def lengths(self) -> list[tuple[int, float]]:
         """Tip node and crack length of every tip on a line; -1 where a run has no tip."""
         if self._known[0] != self._front.version:

@@ -4,8 +4,9 @@
 
 In the unknowns of the jump coordinates this is delta_n + g >= 0 with g = n . (X_s - sum W_m X_m).
 n is the master's normal, interpolated from those of its nodes: over a facet it is on the mean that
-of the facet, so that contact forces do no work on what slides over it. Bonded nodes keep the master
-point they are bonded to, as long as their bonds carry any force.
+of the facet, so that contact forces do no work on what slides over it. Where the pair is
+surface-to-surface, W are means over the facets as they are now. Bonded nodes keep the weights they
+are bonded with, as long as their bonds carry any force.
 """
 
 from __future__ import annotations
@@ -15,8 +16,10 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+import scipy.sparse as sp
 
-from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.interface.mortar import surface_weights
 from fxcrack.interface.pairing import Pair, local_frames
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface
@@ -56,33 +59,66 @@ def renewed(
     aside = np.linalg.norm(away - gap[:, None] * normals, axis=1)
     size = now.facet_size
     over = ~bonded & (aside <= 0.1 * size + 0.1 * np.abs(gap))
-    nodes = now.facets[foot.facet]
-    masters = now.dofs[nodes]
+    nodes, new = now.facets[foot.facet], foot.weights
+    if pair.surface_to_surface:
+        means = surface_weights(pair.whole_surface.moved(x), now, foot, _NEAR * size)
+        nodes, new = means.masters, means.weights
+        slid = _change(pair, now.dofs[nodes], new) > _SLIDE
+    else:
+        slid = (now.dofs[nodes] != pair.masters).any(axis=1)
+        slid |= np.abs(new - pair.weights).max(axis=1) > _SLIDE
     near = over & (gap < _NEAR * size)
-    slid = (masters != pair.masters).any(axis=1)
-    slid |= np.abs(foot.weights - pair.weights).max(axis=1) > _SLIDE
     slid |= np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _SLIDE
     if not np.any(near & (slid | ~pair.paired)):
         return None
-    frames, weights, gaps = pair.frames.copy(), pair.weights.copy(), pair.gap.copy()
-    new_masters = pair.masters.copy()
+    frames, gaps = pair.frames.copy(), pair.gap.copy()
     frames[over] = local_frames(normals, gdim)[over]
-    weights[over], new_masters[over] = foot.weights[over], masters[over]
-    maps = pair.master_maps
-    if maps is not None and master.point_maps is not None:
-        maps = maps.copy()
-        maps[over] = master.point_maps[nodes[over]]
-    undeformed = np.einsum("nk,nkc->nc", foot.weights, master.x[nodes])
+    width = max(new.shape[1], pair.weights.shape[1])
+    weights = np.where(over[:, None], _wide(new, width), _wide(pair.weights, width))
+    node_of = _nodes_of(master, pair.masters)
+    all_nodes = np.where(over[:, None], _wide_nodes(nodes, width), _wide_nodes(node_of, width))
+    undeformed = np.einsum("nk,nkc->nc", new, master.x[nodes])
     gaps[over] = np.einsum("nc,nc->n", pair.surface.x - undeformed, normals)[over]
     return replace(
         pair,
         paired=np.where(bonded, pair.paired, over),
-        masters=new_masters,
+        masters=master.dofs[all_nodes],
         weights=weights,
         frames=frames,
         gap=gaps,
-        master_maps=maps,
+        master_maps=master.maps_at(all_nodes),
     )
+
+
+def _change(pair: Pair, masters: Ints, weights: Array) -> Array:
+    """Largest change of a weight of each slave node, shape (n_nodes,)."""
+    n = len(masters)
+    rows = np.broadcast_to(np.arange(n)[:, None], masters.shape).ravel()
+    before = np.broadcast_to(np.arange(n)[:, None], pair.masters.shape).ravel()
+    known, column = np.unique(
+        np.concatenate([pair.masters.ravel(), masters.ravel()]), return_inverse=True
+    )
+    shape = (n, len(known))
+    split = len(before)
+    old = sp.csr_matrix((pair.weights.ravel(), (before, column[:split])), shape=shape)
+    new = sp.csr_matrix((weights.ravel(), (rows, column[split:])), shape=shape)
+    return np.asarray(abs(new - old).max(axis=1).todense()).ravel()
+
+
+def _wide(weights: Array, width: int) -> Array:
+    """Weights with zeros appended, shape (n_nodes, width)."""
+    return np.pad(weights, ((0, 0), (0, width - weights.shape[1])))
+
+
+def _wide_nodes(nodes: Ints, width: int) -> Ints:
+    """Nodes with their first repeated at the end, shape (n_nodes, width)."""
+    return np.concatenate([nodes, np.repeat(nodes[:, :1], width - nodes.shape[1], axis=1)], axis=1)
+
+
+def _nodes_of(master: FacetSurface, dofs: Ints) -> Ints:
+    """Nodes of the master surface with given global displacement nodes, same shape."""
+    order = np.argsort(master.dofs)
+    return np.asarray(order[np.searchsorted(master.dofs[order], dofs)])
 
 
 def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
@@ -96,9 +132,9 @@ def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
         Arrays by name, shapes as in :class:`Pair`; "masters", shape (n_nodes, k), as node numbers
         of the master surface.
     """
-    order = np.argsort(master.dofs)
-    nodes = order[np.searchsorted(master.dofs[order], pair.masters)]
-    return {name: getattr(pair, name) for name in CHANGING} | {"masters": nodes}
+    return {name: getattr(pair, name) for name in CHANGING} | {
+        "masters": _nodes_of(master, pair.masters)
+    }
 
 
 def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray[Any]]) -> Pair:

@@ -30,6 +30,7 @@ import scipy.sparse as sp
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
+from fxcrack.base.sparse import Product, by_component
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
@@ -85,6 +86,9 @@ class LumpedInterface:
         group_mass: Mass of the nodes with that of the slaves tied to them, shape (n_nodes,).
         inverse: 1/group_mass per component, 0 where prescribed, shape (n_nodes, gdim).
         compliance: H of the open rows per component, shape (n_open, gdim).
+        accelerations: Accelerations of the nodes by the forces on them, those that are prescribed
+            zero; on components of the nodes, shape (n_nodes gdim, n_nodes gdim).
+        version: How often ties, masses or frames have changed.
     """
 
     def __init__(
@@ -116,11 +120,14 @@ class LumpedInterface:
         self.slave = _joined(
             [nodes.find(p.surface.dofs[j]) for p, j in zip(pairs, self.jumped, strict=True)]
         )
-        self.frames = _stacked([f[j] for f, j in zip(frames, self.jumped, strict=True)], gdim)
-        self.held = _stacked([h[j] for h, j in zip(held, self.jumped, strict=True)], gdim, bool)
+        self.frames = _stacked(
+            [f[j] for f, j in zip(frames, self.jumped, strict=True)], (gdim, gdim)
+        )
+        self.held = _stacked([h[j] for h, j in zip(held, self.jumped, strict=True)], (gdim,), bool)
         self.gap = np.concatenate(
             [np.zeros(0), *(p.gap[j] for p, j in zip(pairs, self.jumped, strict=True))]
         )
+        self.version = 0
         self.set_pairing(pairs)
 
     def _support_of(self, pair: Pair) -> Ints:
@@ -188,20 +195,55 @@ class LumpedInterface:
         self._ties = [t for t in self._ties if len(t.rows)]
         self.group_mass = self.collect(self.mass[:, None].copy())[:, 0]
         self.inverse = np.where(self.which < 0, 1.0 / self.group_mass[:, None], 0.0)
+        self.version += 1
+        self._following: sp.csr_matrix | None = None
         self._open_slaves = self.slave[self.open]
         if self.simple:
             assert self.master is not None
             self._open_masters = self.master[self.open]
             both = self.inverse[self._open_slaves] + self.inverse[self._open_masters]
             self.compliance = np.asarray(both)
+            self._accelerate_pairs()
             return
-        n, m = len(self.nodes), len(self.open)
-        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self._open_slaves)), shape=(m, n))
-        self._jump = sp.csr_matrix(picks - self.weights[self.open])
+        following = self.following
+        self._accelerations = sp.csr_matrix(
+            following @ sp.diags(self.inverse.ravel()) @ following.T
+        )
+        self.accelerations = Product(self._accelerations)
+        motion = self._motion()
+        self._jump = self.separations(self.open)
         self._jump_t = self._jump.T.tocsr()
-        self._root = sp.csr_matrix(self._jump @ self._motion())
+        self._root = sp.csr_matrix(self._jump @ motion)
         self._root_t = self._root.T.tocsr()
         self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
+
+    def _accelerate_pairs(self) -> None:
+        """Accelerations where every slave has one master of its own: both of a tied pair share."""
+        n, gdim = self.which.shape
+        if not hasattr(self, "_partner"):
+            assert self.master is not None
+            self._partner = np.arange(n)
+            self._partner[self.slave], self._partner[self.master] = self.master, self.slave
+            nodes = np.column_stack([np.arange(n), self._partner])[:, None, :]
+            columns = gdim * nodes + np.arange(gdim)[None, :, None]
+            self._shares = np.zeros((n, gdim, 2))
+            self.accelerations = Product.of_rows(
+                columns.reshape(-1, 2), self._shares.reshape(-1, 2), n * gdim
+            )
+            self._shares = self.accelerations.data.reshape(n, gdim, 2)
+        shares = self._shares
+        shares[:, :, 0], shares[:, :, 1] = self.inverse, 0.0
+        s = self.slave[self.tied]
+        m = self._partner[s]
+        shared = self.inverse[m]
+        shares[s, :, 0] = shares[s, :, 1] = shares[m, :, 1] = shared
+
+    @property
+    def following(self) -> sp.csr_matrix:
+        """Motion of the nodes by that of those that follow nothing, on components, square."""
+        if self._following is None:
+            self._following = by_component(self._motion(), self.which.shape[1])
+        return self._following
 
     def _tie(self, rows: Ints) -> _Tie:
         if self.simple:
@@ -210,9 +252,14 @@ class LumpedInterface:
         weights = self.weights[rows]
         return _Tie(rows, self.slave[rows], None, (weights, weights.T.tocsr()))
 
-    def _motion(self) -> Any:
+    def _motion(self) -> sp.csr_matrix:
         """T, motion of all nodes by that of those that follow nothing, (n_nodes, n_nodes)."""
         n = len(self.nodes)
+        if self.simple:
+            assert self.master is not None
+            leads = np.arange(n)
+            leads[self.slave[self.tied]] = self.master[self.tied]
+            return sp.csr_matrix((np.ones(n), leads, np.arange(n + 1)), shape=(n, n))
         keep = np.ones(n)
         keep[self.slave[self.tied]] = 0.0
         out = sp.csr_matrix(sp.diags(keep))
@@ -220,7 +267,145 @@ class LumpedInterface:
             m = len(tie.rows)
             place = sp.csr_matrix((np.ones(m), (tie.slaves, np.arange(m))), shape=(n, m))
             out = out + place @ (self.weights[tie.rows] @ out)
-        return out
+        return sp.csr_matrix(out)
+
+    def _collected(self) -> sp.csr_matrix:
+        """What :meth:`collect` does to the values of the nodes, as a matrix (n_nodes, n_nodes)."""
+        out = sp.identity(len(self.nodes), format="csr")
+        for tie in self._ties:
+            out = out + self.weights[tie.rows].T @ out[tie.slaves]
+        return sp.csr_matrix(out)
+
+    # -- chosen rows, as matrices on components of the nodes -----------------------------
+
+    def separations(self, rows: Ints) -> sp.csr_matrix:
+        """E_s - W of some rows, on nodes: jumps by the motion of the nodes, (n, n_nodes)."""
+        m, n = len(rows), len(self.nodes)
+        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self.slave[rows])), shape=(m, n))
+        return sp.csr_matrix(picks - self.weights[rows])
+
+    def mean_jumps(self, rows: Ints, weights: Array) -> Product:
+        """Weighted means of jumps by the motion of the nodes.
+
+        Args:
+            rows: Shape (n, k).
+            weights: Same shape; rows of weight 0 need not exist.
+
+        Returns:
+            On components of the nodes, shape (n gdim, n_nodes gdim).
+        """
+        gdim = self.which.shape[1]
+        rows = np.where(weights != 0.0, rows, 0)
+        if self.simple:
+            assert self.master is not None
+            nodes = np.hstack([self.slave[rows], self.master[rows]])[:, None, :]
+            columns = gdim * nodes + np.arange(gdim)[None, :, None]
+            data = np.repeat(np.hstack([weights, -weights]), gdim, axis=0)
+            return Product.of_rows(
+                columns.reshape(-1, nodes.shape[2]), data, gdim * len(self.nodes)
+            )
+        out = sp.csr_matrix((len(rows), len(self.nodes)))
+        for k in range(rows.shape[1]):
+            out = out + sp.diags(weights[:, k]) @ self.separations(rows[:, k])
+        return Product(by_component(out, gdim))
+
+    def jumps_along(self, rows: Ints, directions: Array) -> Product:
+        """Jumps of some rows along one direction each by the motion of the nodes.
+
+        Args:
+            rows: Shape (n,).
+            directions: Unit vectors, shape (n, gdim).
+
+        Returns:
+            On components of the nodes, shape (n, n_nodes gdim).
+        """
+        gdim = directions.shape[1]
+        if self.simple:
+            columns, data = self._pairs_along(rows, directions, 1.0, 1.0)
+            return Product.of_rows(columns, data, gdim * len(self.nodes))
+        return Product(self._along(rows, directions))
+
+    def _pairs_along(
+        self, rows: Ints, directions: Array, slave: Array | float, master: Array | float
+    ) -> tuple[Ints, Array]:
+        """Components of the nodes of pairs, and a direction times factors, (n, 2 gdim) each."""
+        assert self.master is not None
+        gdim = directions.shape[1]
+        nodes = np.stack([self.slave[rows], self.master[rows]], axis=1)
+        columns = gdim * nodes[:, :, None] + np.arange(gdim)
+        data = np.stack([slave * directions, -master * directions], axis=1)
+        return columns.reshape(-1, 2 * gdim), data.reshape(-1, 2 * gdim)
+
+    def _along(self, rows: Ints, directions: Array) -> sp.csr_matrix:
+        nodes = self.separations(rows)
+        gdim = directions.shape[1]
+        at = np.repeat(np.arange(len(rows)), np.diff(nodes.indptr))
+        data = nodes.data[:, None] * directions[at]
+        columns = gdim * nodes.indices.astype(np.int64)[:, None] + np.arange(gdim)
+        return sp.csr_matrix(
+            (data.ravel(), columns.ravel(), gdim * nodes.indptr.astype(np.int64)),
+            shape=(len(rows), gdim * len(self.nodes)),
+        )
+
+    def pull_along(self, rows: Ints, directions: Array) -> tuple[Product, Array]:
+        """What forces of open rows along one direction each do.
+
+        Args:
+            rows: Shape (n,).
+            directions: Unit vectors, shape (n, gdim).
+
+        Returns:
+            Accelerations of the nodes by such forces on the slaves and their reactions, shape
+            (n_nodes gdim, n); accelerations of the jumps along the directions, shape (n, n).
+        """
+        if self.simple:
+            assert self.master is not None
+            slave, master = self.inverse[self.slave[rows]], self.inverse[self.master[rows]]
+            columns, data = self._pairs_along(rows, directions, slave, master)
+            own = ((slave + master) * directions**2).sum(axis=1)
+            height = directions.shape[1] * len(self.nodes)
+            return Product.of_columns(columns, data, height), np.diag(own)
+        along = self._along(rows, directions)
+        push = sp.csr_matrix(self._accelerations @ along.T)
+        return Product(push), (along @ push).toarray()
+
+    def bonds_of(self, rows: Ints, prescribed: Ints) -> tuple[Product, Product | None]:
+        """Bond forces on the slaves of some tied rows, without what supports of slaves hold.
+
+        Args:
+            rows: Shape (n,).
+            prescribed: Components of the nodes whose accelerations are given, shape (m,).
+
+        Returns:
+            By the forces on the nodes, on components, shape (n gdim, n_nodes gdim); by the given
+            accelerations, shape (n gdim, m), ``None`` where there are none.
+        """
+        gdim, s = self.which.shape[1], self.slave[rows]
+        width = gdim * len(self.nodes)
+        if self.simple and not len(prescribed):
+            assert self.master is not None
+            m = self.master[rows]
+            nodes = np.stack([s, m], axis=1)[:, None, :]
+            columns = gdim * nodes + np.arange(gdim)[None, :, None]
+            share = self.mass[s, None] * self.inverse[m]
+            data = np.stack([share - 1.0, share], axis=2)
+            return Product.of_rows(columns.reshape(-1, 2), data.reshape(-1, 2), width), None
+        at = (gdim * s[:, None] + np.arange(gdim)).ravel()
+        mass = sp.diags(np.repeat(self.group_mass[s], gdim))
+        if self.depth.any():
+            own = by_component(self._collected()[s], gdim)
+        else:
+            n = len(at)
+            own = sp.csr_matrix((np.ones(n), at, np.arange(n + 1)), shape=(n, width))
+        force = mass @ self.accelerations.matrix()[at] - own
+        given = mass @ self.following[at][:, prescribed]
+        held = self.held[rows]
+        if held.any():
+            frames = self.frames[rows]
+            free = np.einsum("nci,ni,ndi->ncd", frames, ~held, frames)
+            project = sp.block_diag(list(free), format="csr")
+            force, given = project @ force, project @ given
+        return Product(force), Product(given)
 
     def collect(self, values: Array) -> Array:
         """Add to the masters what tied slaves give them, in place.
@@ -287,18 +472,18 @@ class LumpedInterface:
             return np.asarray(values[self._open_slaves] - values[self._open_masters])
         return np.asarray(self._jump @ values)
 
-    def push(self, total: Array, forces: Array) -> None:
-        """Add forces on the slave side of the open rows, and their reactions, in place.
+    def on_nodes(self, forces: Array) -> Array:
+        """Forces on the slave side of the open rows and their reactions, shape (n_nodes, gdim).
 
         Args:
-            total: Forces on the nodes after :meth:`collect`, shape (n_nodes, gdim).
             forces: Shape (n_open, gdim).
         """
-        if self.simple:
-            total[self._open_slaves] += forces
-            total[self._open_masters] -= forces
-        else:
-            total += self.collect(self._jump_t @ forces)
+        if not self.simple:
+            return np.asarray(self._jump_t @ forces)
+        out = np.zeros((len(self.nodes), forces.shape[1]))
+        out[self._open_slaves] = forces
+        out[self._open_masters] = -forces
+        return out
 
     def response(self, forces: Array) -> Array:
         """Acceleration of the open jumps by forces on all of them, shape (n_open, gdim)."""
@@ -311,8 +496,7 @@ def _joined(parts: Sequence[Any]) -> Ints:
     return np.concatenate([np.zeros(0, dtype=np.int64), *parts]).astype(np.int64)
 
 
-def _stacked(parts: Sequence[Any], gdim: int, kind: Any = float) -> Any:
-    tail = parts[0].shape[1:] if parts else (gdim,)
+def _stacked(parts: Sequence[Any], tail: tuple[int, ...], kind: Any = float) -> Any:
     return np.concatenate([np.zeros((0, *tail), dtype=kind), *parts])
 
 

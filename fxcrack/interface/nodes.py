@@ -65,6 +65,8 @@ class InterfaceNodes:
         for p, pair in enumerate(pairs):
             rows = every if jumped is None else jumped[p]
             used += [pair.surface.dofs[rows], pair.masters[rows].ravel()]
+            if pair.feet is not None:
+                used.append(pair.feet[0][rows].ravel())
         return cls(layout, np.concatenate(used) if used else np.zeros(0, dtype=np.int64))
 
     def __len__(self) -> int:

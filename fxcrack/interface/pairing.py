@@ -2,12 +2,14 @@
 
     u_s = sum_m W_sm u_m + R_s delta_s,    delta = (opening, slip, tear)
 
-n, the first column of R, points from master to slave.
+n, the first column of R, points from master to slave. W are the shape functions of the master at
+the foot point of the node (node-to-surface), or means over the facets around the node, which hold
+whichever side is the slave (surface-to-surface, :mod:`fxcrack.interface.mortar`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +25,7 @@ from fxcrack.base.checks import (
     keep,
     list_of,
     number,
+    one_of,
     shown,
     text,
 )
@@ -30,7 +33,18 @@ from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.base.positions import as_marks, marks_at, numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
+from fxcrack.interface.mortar import surface_weights
 from fxcrack.interface.projection import project
+from fxcrack.interface.roles import (
+    PAIRINGS,
+    Role,
+    choose_role,
+    covered_whole,
+    fineness_ratio,
+    held_alike,
+    matching,
+    stiffness_ratio,
+)
 from fxcrack.interface.surface import FacetSurface, gather_surface
 
 _FACING = -0.5
@@ -56,6 +70,13 @@ class Interface:
         normal_only: Bonds hold the opening only and let the faces slip.
         tolerance: Search tolerance, length: how far a slave node may lie from the master surface;
             a tenth of the master's facet size by default.
+        pairing: How slave nodes follow the master: "node-to-surface", the point under the node, or
+            "surface-to-surface", means over the facets around it. ``None``: node-to-surface where
+            both sides have the same nodes and facets, in which case the two are equal, and
+            surface-to-surface elsewhere; the nodes of the history are then those of the coarser or
+            much softer side, slave or master, unless ``bonded`` names slave nodes. With ``Inertia``
+            it is always node-to-surface. Node-to-surface bonds of meshes that do not match hold
+            only if the slave is the finer and softer side.
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
         strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
             and ignored otherwise.
@@ -69,6 +90,7 @@ class Interface:
     friction: float | Callable[[Array], npt.ArrayLike] | None = None
     normal_only: bool = False
     tolerance: float | None = None
+    pairing: str | None = None
     gap: str = "adjust"
     strict: bool = False
     name: str | None = None
@@ -96,6 +118,8 @@ class Interface:
                 f"interface '{self.title}': tolerance = {self.tolerance} must be positive and "
                 "finite; None takes a tenth of the facet size"
             )
+        if self.pairing is not None:
+            one_of(where, "pairing", self.pairing, PAIRINGS)
         if not isinstance(self.gap, str) or self.gap not in ("adjust", "keep"):
             raise InterfaceError(f"gap = {shown(self.gap)}: choose 'adjust' or 'keep'")
         self._check_friction()
@@ -135,7 +159,9 @@ class Pair:
 
     Attributes:
         interface: What the user asked for.
-        surface: Slave surface; its node numbers are the slave node numbers.
+        surface: Slave surface; its node numbers are the slave node numbers. Where it lies on the
+            master in part only, its facets are those that do: what has no partner is neither crack
+            nor front.
         paired: Slave nodes that have a master point, shape (n_nodes,); not the nodes of a border
             inside a body, which belong to both sides.
         masters: Global displacement nodes of the masters, shape (n_nodes, k).
@@ -147,6 +173,12 @@ class Pair:
         master_maps: Displacement of a master's point per unknown of its node, shape
             (n_nodes, k, gdim, n_unknowns); ``None`` where the unknowns are the displacement
             (:mod:`fxcrack.continuum.dof_layout`).
+        feet: Masters of the point under each node, and its weights on them, each of shape
+            (n_nodes, n_facet_nodes), where ``weights`` are means over facets; ``None`` where
+            they are those of this point.
+        exchanged: Whether the nodes are those of the side that the interface calls the master
+            (:mod:`fxcrack.interface.roles`).
+        whole: Slave surface with all its facets where ``surface`` has not; ``None`` where it has.
     """
 
     interface: Interface
@@ -159,11 +191,35 @@ class Pair:
     bonded: Bools
     friction: Array | None = None
     master_maps: Array | None = None
+    feet: tuple[Ints, Array] | None = None
+    exchanged: bool = False
+    whole: FacetSurface | None = None
 
     @property
     def title(self) -> str:
         """Name in the history."""
         return self.interface.title
+
+    @property
+    def sides(self) -> tuple[str | Face, str | Face]:
+        """The side whose nodes hold the jumps, and the other one."""
+        slave, master = self.interface.slave, self.interface.master
+        return (master, slave) if self.exchanged else (slave, master)
+
+    @property
+    def whole_surface(self) -> FacetSurface:
+        """Slave surface with all its facets."""
+        return self.whole or self.surface
+
+    @property
+    def surface_to_surface(self) -> bool:
+        """Whether weights are means over facets."""
+        return self.feet is not None
+
+    def masters_under(self, node: int) -> Ints:
+        """Global nodes whose shape functions do not vanish at the point under a slave node."""
+        masters, weights = self.feet or (self.masters, self.weights)
+        return np.asarray(masters[node][weights[node] != 0.0])
 
     def forces_on_masters(self, forces: Array) -> Array:
         """Forces on the masters' unknowns that do the work of given forces on the slave side.
@@ -325,8 +381,25 @@ def grown_together(slave: FacetSurface, master: FacetSurface, where: str) -> Boo
     return grown
 
 
-def make_pair(continuum: Continuum, interface: Interface) -> Pair:
+def make_pair(
+    continuum: Continuum,
+    interface: Interface,
+    *,
+    others: Sequence[Interface] = (),
+    supported: Ints | None = None,
+    lumped: bool = False,
+) -> Pair:
     """Pair slave and master surface; collective, the same result on every rank.
+
+    Args:
+        continuum: The bodies.
+        interface: The interface.
+        others: Other interfaces of these bodies; where they share nodes with this one, its sides
+            keep their roles.
+        supported: Support of each owned dof, -1 where free, shape (n_local,); where one holds the
+            master and not the slave, they keep their roles as well.
+        lumped: Whether the bodies may have lumped masses, which weights below 0 would make
+            negative: node-to-surface is then the default.
 
     Raises:
         InterfaceError: A bonded slave node lies outside the master surface, the two surfaces
@@ -352,23 +425,69 @@ def make_pair(continuum: Continuum, interface: Interface) -> Pair:
             f"{foot.distance[i]:.3g} (search tolerance {tolerance:.3g}); let the master surface "
             "extend under them, take them out of the bonded set, or raise Interface(tolerance=...)"
         )
-    normals = np.where(slave.order >= 1, -slave.normals, 0.0)
-    gap = np.einsum("ni,ni->n", slave.x - foot.foot, normals)
-    if interface.gap == "adjust":
-        gap = np.zeros(len(gap))
-    nodes = master.facets[foot.facet]
+    pairing = interface.pairing or ("node-to-surface" if lumped else None)
+    role = Role.SURFACES if pairing == "surface-to-surface" else Role.NODES
+    if not grown.any() and not matching(slave, master, foot, paired):
+        # both sides of a border inside the body share its nodes, and have the same mesh there
+        back = project(master.x, slave)
+        under = back.distance <= tolerance
+        shared = _shares_nodes(continuum, (slave, master), others)
+        alike = supported is None or held_alike(continuum, supported, master, slave, back, under)
+        role = choose_role(
+            interface.title,
+            pairing,
+            stiffness_ratio(continuum, interface.slave, interface.master),
+            fineness_ratio(slave, master, paired),
+            may_exchange=(interface.bonded is None or callable(interface.bonded))
+            and covered_whole(master, under)
+            and alike
+            and not shared,
+        )
+        if role is Role.EXCHANGED:
+            slave, master, paired, grown = master, slave, under, np.zeros_like(under)
+            bonded = under.copy()
+            if interface.bonded is not None:
+                bonded &= bonded_nodes(interface, slave, continuum)
+            foot = back
+    normals = -slave.normals
+    nodes, weights, feet = master.facets[foot.facet], foot.weights, None
+    if role is not Role.NODES:
+        feet = master.dofs[nodes], weights
+        means = surface_weights(slave, master, foot, tolerance)
+        nodes, weights = means.masters, means.weights
+    gap = np.zeros(slave.n_nodes)
+    if interface.gap == "keep":
+        below = np.einsum("nk,nkc->nc", weights, master.x[nodes])
+        gap = np.einsum("ni,ni->n", slave.x - below, normals)
+    inside = (paired | grown)[slave.facets].all(axis=1) if bonded.any() else np.ones(1, dtype=bool)
+    partly = not inside.all() and inside.any()
     return Pair(
         interface=interface,
-        surface=slave,
+        surface=slave.with_facets(inside) if partly else slave,
         paired=paired,
         masters=master.dofs[nodes],
-        weights=foot.weights,
+        weights=weights,
         frames=local_frames(normals, continuum.gdim),
         gap=gap,
         bonded=bonded,
         friction=friction_of(interface, slave),
         master_maps=master.maps_at(nodes),
+        feet=feet,
+        exchanged=role is Role.EXCHANGED,
+        whole=slave if partly else None,
     )
+
+
+def _shares_nodes(
+    continuum: Continuum, sides: Sequence[FacetSurface], others: Sequence[Interface]
+) -> bool:
+    """Whether other interfaces have nodes of two surfaces; collective."""
+    own = np.concatenate([side.dofs for side in sides])
+    for other in others:
+        for name in (other.slave, other.master):
+            if np.isin(gather_surface(continuum, name).dofs, own).any():
+                return True
+    return False
 
 
 __all__ = ["Bonded", "InputError", "Interface", "Pair", "local_frames", "make_pair"]

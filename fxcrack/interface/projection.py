@@ -52,7 +52,7 @@ def project(points: Array, surface: FacetSurface) -> Projection:
 
     def attempt(chosen: Ints, column: Ints) -> None:
         nodes = surface.x[surface.facets[column]]
-        xi = _closest(points[chosen], nodes, surface)
+        xi = closest(points[chosen], nodes, surface)
         values, _ = shape_functions(surface.kind, surface.order, xi)
         foot = np.einsum("nk,nkc->nc", values, nodes)
         distance = np.linalg.norm(points[chosen] - foot, axis=1)
@@ -60,7 +60,7 @@ def project(points: Array, surface: FacetSurface) -> Projection:
         won = chosen[better]
         best[won], facet[won], xi_best[won] = distance[better], column[better], xi[better]
 
-    for members, centre, radius in _by_size(surface):
+    for members, centre, radius in by_size(surface):
         tree, waiting, n_near = cKDTree(centre), np.arange(n), min(4, len(members))
         while len(waiting):
             far, near = tree.query(points[waiting], k=n_near)
@@ -86,11 +86,17 @@ def project(points: Array, surface: FacetSurface) -> Projection:
     return Projection(facet, weights, foot, normal, np.linalg.norm(points - foot, axis=1))
 
 
-def _by_size(surface: FacetSurface) -> list[tuple[Ints, Array, float]]:
+def by_size(surface: FacetSurface) -> list[tuple[Ints, Array, float]]:
     """Facets of similar size together: their numbers, centres and largest radius.
 
     On a graded surface the closest centre may belong to a small facet beside the large one that
     holds the point; among facets of one size few centres need to be looked at.
+
+    Args:
+        surface: The surface.
+
+    Returns:
+        Per size the facets, shape (n,), their centres, shape (n, 3), length, and the radius.
     """
     nodes = surface.x[surface.facets]
     centre = nodes[:, : surface.n_corners].mean(axis=1)
@@ -100,8 +106,17 @@ def _by_size(surface: FacetSurface) -> list[tuple[Ints, Array, float]]:
     return [(g, centre[g], float(radius[g].max())) for g in groups]
 
 
-def _closest(points: Array, nodes: Array, surface: FacetSurface) -> Array:
-    """Reference coordinates of the closest points, one facet per point (projected Gauss-Newton)."""
+def closest(points: Array, nodes: Array, surface: FacetSurface) -> Array:
+    """Reference coordinates of the closest points, one facet per point (projected Gauss-Newton).
+
+    Args:
+        points: Positions, shape (n, 3), length.
+        nodes: Nodes of the facet of each point, shape (n, k, 3), length.
+        surface: Says the shape functions of the facets.
+
+    Returns:
+        Shape (n, dim).
+    """
     xi = np.full((len(points), surface.dim), 0.5 if surface.kind != "triangle" else 1.0 / 3.0)
     for _ in range(30):
         values, gradient = shape_functions(surface.kind, surface.order, xi)

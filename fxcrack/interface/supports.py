@@ -360,7 +360,7 @@ def check_slaves(
         displacement = which[slave[taking_part], : nodes.layout.gdim]
         supported[taking_part] = (displacement >= 0).any(axis=1)
         for node in np.flatnonzero(supported):
-            masters = nodes.find(pair.masters[node][pair.weights[node] != 0.0])
+            masters = nodes.find(pair.masters_under(int(node)))
             column = _unshared_support(
                 which[slave[node], : nodes.layout.gdim], value[slave[node]],
                 which[masters], value[masters], supports,

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base import compat
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InterfaceError, raise_on_all_ranks
 from fxcrack.continuum.continuum import Continuum
@@ -133,6 +133,15 @@ class FacetSurface:
         own, _ = replace(self, outward=np.ones(len(self.facets))).facet_normals(centre)
         return replace(self, x=x, outward=np.sign(np.einsum("fc,fc->f", unit[:, 0], own[:, 0])))
 
+    def with_facets(self, chosen: Bools) -> FacetSurface:
+        """The same nodes with some of the facets, sides kept.
+
+        Args:
+            chosen: Which facets, shape (n_facets,).
+        """
+        outward = None if self.outward is None else self.outward[chosen]
+        return replace(self, facets=self.facets[chosen], inner=self.inner[chosen], outward=outward)
+
     def maps_at(self, nodes: Ints) -> Array | None:
         """``point_maps`` of some nodes, shape (..., gdim, n_unknowns)."""
         return None if self.point_maps is None else np.asarray(self.point_maps[nodes])
@@ -144,7 +153,8 @@ class FacetSurface:
         unit, size = self.facet_normals(points)
         total = np.zeros((self.n_nodes, 3))
         np.add.at(total, self.facets, unit * size[..., None])
-        return total / np.linalg.norm(total, axis=1, keepdims=True)
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        return total / np.where(length > 0.0, length, 1.0)  # 0 at nodes without facets
 
     @cached_property
     def areas(self) -> Array:
@@ -169,7 +179,7 @@ class FacetSurface:
         return float(np.median(edges))
 
 
-def _closure_table(cell: basix.CellType, order: int) -> tuple[str, Ints]:
+def closure_table(cell: basix.CellType, order: int) -> tuple[str, Ints]:
     """Facet cell and, per local facet, the cell's dofs in the facet element's order."""
     tdim = len(basix.topology(cell)) - 1
     element = basix.create_element(
@@ -209,7 +219,7 @@ def facet_nodes(
     to_cell, to_facet = topology.connectivity(tdim - 1, tdim), topology.connectivity(tdim, tdim - 1)
     cells = np.asarray(to_cell.array[to_cell.offsets[facets]], dtype=np.int32)
     element = continuum.space.element.basix_element
-    kind, table = _closure_table(element.cell_type, continuum.order)
+    kind, table = closure_table(element.cell_type, continuum.order)
     around = to_facet.array.reshape(-1, len(table))[cells]
     local = np.argmax(around == facets[:, None], axis=1)
     nodes = continuum.space.dofmap.list[cells[:, None], table[local]]

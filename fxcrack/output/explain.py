@@ -5,6 +5,7 @@ Nothing is estimated: unknowns and terms are counted, seconds are those of the r
 
 from __future__ import annotations
 
+import html
 import warnings
 from dataclasses import dataclass
 
@@ -70,6 +71,10 @@ class Explanation:
         if not self.phases:
             lines.append("seconds: not run yet")
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """The same lines for notebooks."""
+        return f"<pre>{html.escape(str(self))}</pre>"
 
 
 def explain(source: Analysis | HasAnalysis) -> Explanation:

@@ -111,7 +111,7 @@ def body_grid(analysis: Analysis, u: fem.Function, time: float) -> Grid:
 
 def interface_grid(pair: Pair, fields: InterfaceFields) -> Grid:
     """The slave surface with its fields."""
-    surface = pair.surface
+    surface = pair.whole_surface
     kind, order = FACETS[surface.kind, surface.order]
     return Grid(
         points=surface.x,

@@ -11,6 +11,7 @@ cell at which it is integrated and where they are most accurate.
 from __future__ import annotations
 
 import csv
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -27,6 +28,8 @@ from fxcrack.base.files import replacing
 from fxcrack.continuum.kinematics import green_lagrange
 from fxcrack.continuum.laminate import Laminate, square_strain
 from fxcrack.continuum.shell_cells import ShellCells
+from fxcrack.continuum.shell_hexahedron import values as shapes
+from fxcrack.continuum.tied_cells import TiedCells
 from fxcrack.output.fields import displacement_function
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
@@ -136,17 +139,10 @@ def ply_results(source: Analysis | HasAnalysis, group: str | None = None) -> Ply
 
 def _evaluated(analysis: Analysis, cells: ShellCells, u: fem.Function, finite: bool) -> PlyResults:
     continuum = analysis.continuum
-    strain = continuum.model.strain(u, continuum.x)
-    if finite:
-        strain = green_lagrange(continuum.model, u, continuum.x)
-    local = ufl.dot(cells.strain_rotation, strain)
-    rise: Any = 0 * continuum.x[0]
-    if continuum.temperature is not None:
-        continuum.temperature.set(analysis.time)
-        rise = continuum.temperature.rise
-    wanted = ufl.as_vector(
-        [*(local[i] for i in range(6)), *(continuum.x[i] for i in range(3)), rise]
-    )
+    evaluate = _of_form(analysis, cells, u, finite)
+    if cells.order == 1:
+        tied = next(t for t in continuum.tied_cells.values() if t.shell is cells)
+        evaluate = _of_tied(tied, u, finite)
     domain, on = continuum.mesh.domain, cells.stacking
     owned = on.cells < domain.topology.index_map(3).size_local
     original = np.asarray(compat.original_cell_index(domain), dtype=np.int64)
@@ -158,8 +154,7 @@ def _evaluated(analysis: Analysis, cells: ShellCells, u: fem.Function, finite: b
         mine = np.flatnonzero((kinds == kind).all(axis=1) & owned)
         plies = cells.layers[layer]
         zeta = _places(plies)
-        expression = fem.Expression(wanted, _points(axis, bool(up), zeta.ravel()))
-        values = np.asarray(expression.eval(domain, on.cells[mine].astype(np.int32)))
+        values = evaluate(on.cells[mine], axis, bool(up), zeta.ravel())
         values = values.reshape(len(mine), len(plies.plies), 3, 4, 10).mean(axis=3)
         tables.append(_of_layer(cells, layer, values, cells.heights[mine], zeta, finite))
         tables[-1]["cell"] = original[on.cells[mine]]
@@ -181,6 +176,47 @@ def _evaluated(analysis: Analysis, cells: ShellCells, u: fem.Function, finite: b
         forces=per_cell["forces"][by_cell],
         centres=per_cell["centres"][by_cell],
     )
+
+
+Evaluate = Callable[[Ints, int, bool, Array], Array]
+"""Strains, position and rise of temperature of cells, of their axis across, whether it runs up, and
+zeta, shape (n,), to shape (n_cells, 4 n, 10)."""
+
+
+def _of_form(analysis: Analysis, cells: ShellCells, u: fem.Function, finite: bool) -> Evaluate:
+    """The strains of the displacement."""
+    continuum = analysis.continuum
+    strain = continuum.model.strain(u, continuum.x)
+    if finite:
+        strain = green_lagrange(continuum.model, u, continuum.x)
+    local = ufl.dot(cells.strain_rotation, strain)
+    rise: Any = 0 * continuum.x[0]
+    if continuum.temperature is not None:
+        continuum.temperature.set(analysis.time)
+        rise = continuum.temperature.rise
+    wanted = ufl.as_vector(
+        [*(local[i] for i in range(6)), *(continuum.x[i] for i in range(3)), rise]
+    )
+
+    def evaluate(on: Ints, axis: int, up: bool, zeta: Array) -> Array:
+        expression = fem.Expression(wanted, _points(axis, up, zeta))
+        found = np.asarray(expression.eval(continuum.mesh.domain, on.astype(np.int32)))
+        return found.reshape(len(on), -1, 10)
+
+    return evaluate
+
+
+def _of_tied(tied: TiedCells, u: fem.Function, finite: bool) -> Evaluate:
+    """The tied and enhanced strains of first-order cells."""
+
+    def evaluate(on: Ints, axis: int, up: bool, zeta: Array) -> Array:
+        points = _points(2, True, zeta)  # these cells are numbered upwards
+        here = np.isin(tied.cells, on)
+        strain = tied.strains(u, points, finite=finite)[here]
+        x = np.einsum("pk,ckx->cpx", shapes(points), tied.x[here])
+        return np.concatenate([strain, x, np.zeros((*x.shape[:2], 1))], axis=-1)
+
+    return evaluate
 
 
 def _places(plies: Laminate) -> Array:

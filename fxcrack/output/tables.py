@@ -163,9 +163,9 @@ def tip_table(source: Analysis | HasAnalysis) -> str:
     analysis = analysis_of(source)
     lines = []
     for number, g in enumerate(analysis.cracks, start=1):
-        interface = g.debond.interface
+        slave, master = analysis.pairs[g.p].sides
         lines.append(
-            f"crack {number}: slave '{interface.slave}', master '{interface.master}', "
+            f"crack {number}: slave '{slave}', master '{master}', "
             f"{type(g.criterion).__name__}, {g.n_released} nodes released, "
             f"open area {g.extent.area(g.tips()):.6g}"
         )

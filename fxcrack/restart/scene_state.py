@@ -15,6 +15,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
+from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.restart.checkpoint import Arrays, Saved
 from fxcrack.restart.growing import Cell, GrowingArray, RowTable, rows_of
 from fxcrack.solvers.base import Solver
@@ -58,6 +59,8 @@ def collect(analysis: Analysis, packed: Packed) -> Saved:
     for p in fatigue.waiting:
         arrays[f"fatigue.waiting[{p}]"] = fatigue.waiting[p]
         arrays[f"fatigue.credit[{p}]"] = fatigue.credit[p]
+        arrays[f"fatigue.part[{p}]"] = fatigue.ligaments[p].part
+        arrays[f"fatigue.stiffness[{p}]"] = fatigue.ligaments[p].stiffness
     about = {
         "balance": analysis.balance.asdict(),
         "ramps": [_ramp(r) for r in analysis.ramps],
@@ -91,6 +94,11 @@ def apply_before_condensation(analysis: Analysis, saved: Saved) -> None:
     for p in known["pairs"]:
         fatigue.waiting[p] = np.asarray(arrays[f"fatigue.waiting[{p}]"], dtype=bool)
         fatigue.credit[p] = np.asarray(arrays[f"fatigue.credit[{p}]"], dtype=float)
+        fatigue.ligaments[p] = Ligaments.none(len(fatigue.credit[p]))
+        for name in ("part", "stiffness"):
+            if f"fatigue.{name}[{p}]" in arrays:  # not in files of versions without partial growth
+                given = np.array(arrays[f"fatigue.{name}[{p}]"], dtype=float)
+                setattr(fatigue.ligaments[p], name, given)
 
 
 def apply_after_condensation(analysis: Analysis, saved: Saved) -> None:

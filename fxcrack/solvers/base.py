@@ -179,6 +179,15 @@ class Solver(AnySolver, Protocol):
 
     # -- from equilibrium to equilibrium -------------------------------------------------
 
+    def begin_motion(self, dt: float) -> None:
+        """Let bodies with inertia that nothing holds begin without an equilibrium.
+
+        Called before the first :meth:`prepare`.
+
+        Args:
+            dt: Length of the first increment, time.
+        """
+
     def start(self) -> None:
         """Find the equilibrium without loads."""
 

@@ -37,9 +37,7 @@ class DeformedInterfaces:
         self._gdim = continuum.gdim
         # undeformed master surfaces of those whose pairing is renewed
         self._masters = [
-            gather_surface(continuum, p.interface.master)
-            if finite and p.interface.contact
-            else None
+            gather_surface(continuum, p.sides[1]) if finite and p.interface.contact else None
             for p in pairs
         ]
         self._undeformed = [p.surface.x for p in pairs]

@@ -26,6 +26,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.sparse import add_multiple
 from fxcrack.base.timings import Timings
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
@@ -40,6 +41,7 @@ from fxcrack.interface.jump_coordinates import global_vectors
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair, local_frames
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_energies import MotionEnergies, stored_energies, sums_over_ranks
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
@@ -77,7 +79,6 @@ class ExplicitSolver:
     Attributes:
         Those of :class:`fxcrack.solvers.base.AnySolver`, and
         bodies: Internal forces, with the displacement.
-        velocity: In the middle of the last increment, shape (n_local,), length/time.
         mass: Mass of the owned dofs, and what mass scaling has added to it.
         energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
@@ -110,7 +111,8 @@ class ExplicitSolver:
         self.around = [(0.0, 0.0)] * len(pairs)
         self.bodies = InternalForces(continuum, terms)
         self.mass = ScaledMass(lumped_mass(continuum, effect))
-        self.velocity = starting_velocity(continuum, effect.velocity)
+        self._velocity = starting_velocity(continuum, effect.velocity)
+        self._velocity_whole = True  # at interface nodes as well
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
@@ -121,7 +123,10 @@ class ExplicitSolver:
         self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass.values)
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
-        self._force = np.zeros(continuum.n_local)
+        self._owned = self.bodies.u.x.array[: continuum.n_local]  # displacement of the owned dofs
+        chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
+        self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
+        self.motion = BodyMotion(self.bodies, chosen)
         self._now: Array | None = None  # coordinates of the present increment
         self._files = MotionFiles(continuum)
         zero = np.zeros(self.lumped.n_rows * continuum.gdim)
@@ -147,13 +152,21 @@ class ExplicitSolver:
         self.dynamics = InterfaceDynamics(lumped, self.pairs, tied)
         self._mine = nodes.mine
         self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
+        self._bonds = np.zeros((lumped.n_rows + 1, gdim))
+        self._jumps = np.zeros((lumped.n_rows + 1, gdim))
+        self._at_nodes = np.zeros(gdim * len(nodes))
+        self._bonds_known = False
         self._any_held = bool(lumped.held.any())
-        self.bonds = np.zeros((lumped.n_rows + 1, gdim))
-        self.jumps = np.zeros((lumped.n_rows + 1, gdim))
-        self.face_loads: Array | None = None
-        if self._outer.take_faces(lumped):
-            self.face_loads = np.zeros_like(self.bonds)
-        self.dynamics.v = nodes.gather(self.velocity)
+        self._has_face_loads = self._outer.take_faces(lumped)
+        self.dynamics.v = nodes.gather(self._velocity)
+
+    @property
+    def velocity(self) -> Array:
+        """In the middle of the last increment, owned dofs, shape (n_local,), length/time."""
+        if not self._velocity_whole and len(self._at_interface):
+            self._velocity[self._at_interface] = self.dynamics.v[self._mine].ravel()
+        self._velocity_whole = True
+        return self._velocity
 
     # -- a step begins -------------------------------------------------------------------
 
@@ -176,6 +189,8 @@ class ExplicitSolver:
         if self.mass.choose(options, self.bodies):
             self._take_mass()
         self.stable = self._stable_increment()
+        self.motion.prepare(self.mass.inverse)
+        self._outer.divide(self._chosen, self.mass.inverse)
         self.dt = chosen_increment(options, self.stable)
         self.timings.add("stable increment", start)
         self.dynamics.penalty = options.penalty if options.contact == "penalty" else None
@@ -204,7 +219,8 @@ class ExplicitSolver:
             front.follow(x)
             frames = local_frames(-front.surface.normals, gdim)
             lumped.frames[rows[has]] = frames[has]
-        self.dynamics.set_ties(lumped.tied)
+        lumped.version += 1
+        self.dynamics.set_frames()
 
     def renew_stable_increment(self) -> float:
         """The stable increment with the present tangent, by a few more steps; collective."""
@@ -240,34 +256,64 @@ class ExplicitSolver:
         columns = len(self.supports.columns)
         self._h = 0.5 * (self.last_dt + self.dt)
         self._now, self._loads, self._coordinates = now, now[columns:], then[:columns]
-        force = np.negative(self.bodies.forces())
-        if not self.increments:
-            self._first = -force
-        self._outer.add_to(force, self._loads)
+        chosen = self._at_chosen
+        self.motion.forces(chosen, self._h)
+        np.negative(chosen, out=chosen)
+        if self.dt != self.last_dt:
+            self._internal = self.motion.whole()
+        self._outer.add_at_chosen(chosen, self._loads)
         if self._damping:
-            force -= self._damping * self.mass.values * self.velocity
-        self._force = force
+            at = self._chosen
+            chosen -= self._damping * self.mass.values[at] * self.velocity[at]
         t1 = clock.perf_counter()
-        nodes = self.lumped.nodes
-        if len(nodes):
-            self._at_nodes = nodes.gather(force)
+        if len(self.lumped.nodes):
+            mine = chosen[: len(self._at_interface)]
+            if self.comm.size > 1:
+                mine = self.lumped.nodes.share(mine.reshape(-1, self.continuum.gdim)).ravel()
+            self._at_nodes = mine
             self.accelerate()
         t2 = clock.perf_counter()
         self.seconds["internal forces"] += t1 - t0
         self.seconds["interface"] += t2 - t1
 
     def accelerate(self) -> None:
-        """Accelerations of the interface nodes and bond forces, with the present ties."""
+        """Motion of the interface nodes and the forces between them, with the present ties."""
+        self.dynamics.accelerate(self._at_nodes, self._coordinates, self._h, self.dt)
+        self._bonds_known = False
+
+    @property
+    def bonds(self) -> Array:
+        """Forces of the tied bonds on the slaves, shape (n_rows + 1, gdim), force."""
+        self._know_bonds()
+        return self._bonds
+
+    @property
+    def jumps(self) -> Array:
+        """Jumps of the open rows, shape (n_rows + 1, gdim), length."""
+        self._know_bonds()
+        return self._jumps
+
+    @property
+    def face_loads(self) -> Array | None:
+        """Loads on the slave side, shape (n_rows + 1, gdim), force; ``None``: there are none."""
+        if not self._has_face_loads:
+            return None
+        out = np.zeros_like(self._bonds)
+        out[:-1] = self._outer.on_faces(self._loads)
+        return out
+
+    def _know_bonds(self) -> None:
+        """Find bond forces and jumps of all rows in the present increment."""
+        if self._bonds_known:
+            return
         dynamics, lumped = self.dynamics, self.lumped
-        dynamics.accelerate(self._at_nodes.copy(), self._coordinates, self._h, self.dt)
         rows, forces = lumped.bond_forces(dynamics.a, dynamics.total)
         if self._any_held:
             forces = self._without_supports(rows, forces)
-        self.bonds[lumped.open] = 0.0
-        self.bonds[rows] = forces
-        self.jumps[lumped.open] = dynamics.gap
-        if self.face_loads is not None:
-            self.face_loads[:-1] = self._outer.on_faces(self._loads)
+        self._bonds[lumped.open] = 0.0
+        self._bonds[rows] = forces
+        self._jumps[lumped.open] = dynamics.gap
+        self._bonds_known = True
 
     def _without_supports(self, rows: Ints, forces: Array) -> Array:
         """Bond forces without the components that supports hold, which are their reactions."""
@@ -279,41 +325,50 @@ class ExplicitSolver:
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
         start = clock.perf_counter()
-        h, dt, v, a = self._h, self.dt, self.velocity, self._force
-        n = self.continuum.n_local
-        u = self.bodies.u.x.array[:n]
-        prescribed, dynamics = self.prescribed, self.dynamics
-        reactions = self.reactions()
-        power = self._outer.power(self._loads, v)
-        if self._damping:
-            before = v.copy()
+        h, dt, u = self._h, self.dt, self._owned
+        prescribed, dynamics, energies = self.prescribed, self.dynamics, self.energies
+        given = prescribed.velocities(u, self._coordinates, dt)
+        reactions = self._reactions_to(given)
+        at, mine = self._at_interface, self._mine
+        # loads, damping and changes of the increment look at all dofs
+        whole = bool(self.loads) or self._damping > 0.0 or dt != self.last_dt
+        v = self.velocity if whole else self._velocity
+        before = v.copy() if whole else v
         old = prescribed.motion(v, dynamics.v)
-        a *= self.mass.inverse
-        if len(self._at_interface):
-            a[self._at_interface] = dynamics.a[self._mine].ravel()
-        a *= h
-        if not self.increments:
-            begun = v.copy()
-        v += a
-        v[prescribed.dofs] = prescribed.velocities(u, self._coordinates, dt)
+        if self._damping:
+            v *= 1.0 - h * self._damping
+        self.motion.add_change(v)
+        self._outer.add_elsewhere(v, self._loads, h)
         dynamics.advance(h, dt)
-        energies, mass = self.energies, self.mass.values
-        power += self._outer.power(self._loads, v)
-        power += float(reactions @ (old + prescribed.motion(v, dynamics.v)))
+        v[prescribed.dofs] = given
+        if whole and len(at):
+            v[at] = dynamics.v[mine].ravel()
+        power = float(reactions @ (old + prescribed.motion(v, dynamics.v)))
+        if self.loads:
+            power += self._outer.power(self._loads, before)
+            power += self._outer.power(self._loads, v)
         energies.work += 0.5 * h * power
         if self._damping:
-            energies.damped += 0.5 * h * self._damping * float((before * mass) @ (before + v))
-        if not self.increments:
-            # the strain energy of the first half increment looks ahead to the whole of it
-            more = 0.25 * dt * float(self._first @ (v - begun))
-            energies.initial += sums_over_ranks(self.comm, more)[0]
-        np.multiply(v, dt, out=a)
-        u += a
+            rate = 0.5 * h * self._damping
+            energies.damped += rate * float((before * self.mass.values) @ (before + v))
+        if dt != self.last_dt:
+            # U of linear bodies is u^n . f_int(u^{n+1})/2: it changes with the length of increments
+            more = 0.25 * (dt - self.last_dt) * float(self._internal @ (v - before))
+            more = sums_over_ranks(self.comm, more)[0]
+            if self.increments:
+                energies.renewed -= more
+            else:
+                energies.initial += more
+        self._velocity_whole = whole
+        add_multiple(u, dt, v)
+        if len(at):
+            u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
         if self.comm.size > 1:
             self.bodies.u.x.scatter_forward()
         self.at += dt
         self.last_dt = dt
         self.increments += 1
+        self._bonds_known = False
         self.seconds["update"] += clock.perf_counter() - start
 
     def reactions(self) -> Array:
@@ -321,12 +376,17 @@ class ExplicitSolver:
 
         Between :meth:`begin` and :meth:`finish`. Shape (n_prescribed,), force.
         """
-        prescribed, n = self.prescribed, self.continuum.n_local
-        u, dofs = self.bodies.u.x.array[:n], self.prescribed.dofs
-        speed = prescribed.velocities(u, self._coordinates, self.dt)
-        within = (
-            self.mass.values[dofs] * (speed - self.velocity[dofs]) / self._h - self._force[dofs]
+        return self._reactions_to(
+            self.prescribed.velocities(self._owned, self._coordinates, self.dt)
         )
+
+    def _reactions_to(self, velocities: Array) -> Array:
+        """Reactions where dofs within the bodies are given velocities, shape (n_dofs,)."""
+        prescribed, dofs = self.prescribed, self.prescribed.dofs
+        acceleration = (velocities - self._velocity[dofs]) / self._h
+        within = self.mass.values[dofs] * acceleration - self._at_chosen[len(self._at_interface) :]
+        if not prescribed.holds_nodes:
+            return within
         return np.concatenate([within, prescribed.at_nodes(self.lumped, self.dynamics)])
 
     # -- energies ------------------------------------------------------------------------
@@ -336,7 +396,7 @@ class ExplicitSolver:
 
         Before the first increment they are those of the start.
         """
-        out = stored_energies(self.bodies, self.mass, self.velocity, self.last_dt)
+        out = stored_energies(self.bodies, self.motion, self.mass, self.velocity, self.last_dt)
         out["kinetic_energy"] += self.lumped.excess_energy(self.dynamics.v)
         return out
 
@@ -354,6 +414,8 @@ class ExplicitSolver:
             out["friction_energy"] = energies.friction
         if not self.lumped.simple:
             out["tie_energy"] = energies.ties
+        if self.energies.renewed:
+            out["dt_energy"] = self.energies.renewed
         if self._damping:
             out["damping_energy"] = self.energies.totals()[1]
         return out
@@ -507,7 +569,8 @@ class ExplicitSolver:
         values[prescribed.dofs] = self.reactions()[: len(prescribed.dofs)]
         if len(self._at_interface):
             mine, lumped = self._mine, self.lumped
-            held = lumped.mass[mine, None] * self.dynamics.a[mine] - self._at_nodes[mine]
+            forces = self._at_nodes.reshape(-1, self.continuum.gdim)
+            held = lumped.mass[mine, None] * self.dynamics.a[mine] - forces[mine]
             values[self._at_interface] = held.ravel()
         vector.array[:] = values
         return vector

@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_mass import ScaledMass
 
 
@@ -34,30 +35,34 @@ class MotionEnergies:
         work: Of supports and loads.
         damped: Dissipated by damping.
         initial: Stored at the start, that of all ranks.
+        renewed: Gone with changes of the increment, that of all ranks: energies belong to the
+            middle of increments, which a change of dt moves.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = comm
-        self.work = self.damped = self.initial = 0.0
+        self.work = self.damped = self.initial = self.renewed = 0.0
 
-    def totals(self) -> tuple[float, float, float]:
-        """Work, damping and energy at the start of all ranks; collective."""
+    def totals(self) -> tuple[float, float, float, float]:
+        """Work, damping, energy at the start and gone with changes of dt; collective."""
         work, damped = sums_over_ranks(self._comm, self.work, self.damped)
-        return work, damped, self.initial
+        return work, damped, self.initial, self.renewed
 
-    def restore(self, totals: tuple[float, float, float]) -> None:
+    def restore(self, totals: tuple[float, float, float, float]) -> None:
         """Take what :meth:`totals` gave."""
         mine = float(self._comm.rank == 0)
-        self.work, self.damped, self.initial = mine * totals[0], mine * totals[1], totals[2]
+        self.work, self.damped = mine * totals[0], mine * totals[1]
+        self.initial, self.renewed = totals[2:]
 
 
 def stored_energies(
-    bodies: InternalForces, mass: ScaledMass, velocity: Array, dt: float
+    bodies: InternalForces, motion: BodyMotion, mass: ScaledMass, velocity: Array, dt: float
 ) -> dict[str, float]:
     """Strain and kinetic energy in the middle of the last increment, by name; collective.
 
     Args:
         bodies: The bodies at its end.
+        motion: Their internal forces.
         mass: Their mass; what scaling has added to it has an entry of its own.
         velocity: Velocity in its middle, owned dofs, shape (n_local,), length/time.
         dt: Its length, time; 0 before the first one.
@@ -67,7 +72,7 @@ def stored_energies(
     kinetic, added = 0.5 * float(mass.values @ square), 0.5 * float(mass.added @ square)
     now = bodies.u.x.array[:n].copy()
     if bodies.linear:
-        strain = 0.5 * float((now - dt * velocity) @ bodies.forces())
+        strain = 0.5 * float((now - dt * velocity) @ motion.whole())
     else:
         strain = 0.0
         force = bodies.forces().copy()

@@ -10,6 +10,9 @@ those it would end with if no force acted on the open pairs, d* = d + dt B (v + 
 one pair after the other where every slave has a master of its own; where slaves share masters, in a
 few sweeps over all of them. Work counts with the mean velocity of the increment, so that the sum of
 all energies stays what it was, whatever the forces are.
+
+Most increments need little of this: softening bonds are solved alone, and only where a pair would
+overlap afterwards are all open pairs looked at (:meth:`InterfaceDynamics._general`).
 """
 
 from __future__ import annotations
@@ -20,17 +23,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.equilibrium.discrete_gradient import softening_force
+from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
-
-SWEEPS = 200
-"""Sweeps, at most, over nodes that share masters; those of stiff bonds take many."""
-_SETTLED = 1e-12
-"""Change of forces in a sweep, over the largest of them, that ends the sweeps."""
-_FREE = 1.0 - 1e-12
-"""Part of the final opening from which on a bond is free."""
+from fxcrack.solvers.explicit_softening import SWEEPS, LiveBonds, settled
 
 
 @dataclass
@@ -55,18 +52,31 @@ class _Acting:
     """Forces on the slave side of the open rows in the present increment, by what they are.
 
     Attributes:
-        softening: Rows among the open ones that soften, and their forces.
-        fading: Likewise, of bonds that fade.
+        softening: Forces of the live bonds, tension positive, shape (n_live,).
+        fading: Rows among the open ones, and forces, of bonds that fade.
         contact: Likewise, of faces that touch; normal forces.
         friction: Likewise, tangential forces.
-        total: Sum of all, shape (n_open, gdim); ``None`` where nothing acts.
+        total: Sum of all, shape (n_open, gdim); ``None`` where only live bonds act, or nothing.
     """
 
-    softening: tuple[Ints, Array] | None = None
+    softening: Array | None = None
     fading: tuple[Ints, Array] | None = None
     contact: tuple[Ints, Array] | None = None
     friction: tuple[Ints, Array] | None = None
     total: Array | None = None
+
+
+@dataclass(frozen=True)
+class ChosenBonds:
+    """Bond forces of some tied rows, as long as ties stay as they are.
+
+    Attributes:
+        by_forces: From the forces on the nodes, (n gdim, n_nodes gdim).
+        by_motion: From the accelerations that supports prescribe at nodes, (n gdim, n_prescribed).
+    """
+
+    by_forces: Product
+    by_motion: Product | None
 
 
 class InterfaceDynamics:
@@ -78,12 +88,6 @@ class InterfaceDynamics:
         tied: Rows that are tied at the beginning, shape (n_rows,).
 
     Attributes:
-        u: Displacement of the nodes, shape (n_nodes, gdim), length.
-        v: Velocity in the middle of the last increment, same shape, length/time.
-        a: Acceleration of the present increment, same shape.
-        total: Forces on the nodes with what tied slaves give them, same shape.
-        gap: Jumps of the open rows at the start of the increment, shape (n_open, gdim), length.
-        bonds: Softening laws.
         fading: Bond forces that fall with time.
         energies: What has left the bodies through the interfaces.
         penalty: Stiffness of contact over m/dt^2 of the pair; ``None``: by multipliers.
@@ -92,10 +96,14 @@ class InterfaceDynamics:
     def __init__(self, lumped: LumpedInterface, pairs: Sequence[Pair], tied: Bools) -> None:
         gdim = lumped.frames.shape[-1]
         self.lumped = lumped
-        n = len(lumped.nodes)
-        self.u, self.v = np.zeros((n, gdim)), np.zeros((n, gdim))
-        self.a, self.total = np.zeros((n, gdim)), np.zeros((n, gdim))
-        self.bonds = SofteningBonds.none(lumped.n_rows, gdim)
+        self._shape = len(lumped.nodes), gdim
+        n = len(lumped.nodes) * gdim
+        # displacement and velocity, those of the end of the increment, and work space
+        self._u, self._v, self._x, self._y = (np.zeros(n) for _ in range(4))
+        self._a, self._given, self._work = np.zeros(n), np.zeros(n), np.zeros(n)
+        self._forces = np.zeros(n)
+        self._more: Array | None = None
+        self._bonds = SofteningBonds.none(lumped.n_rows, gdim)
         self.fading: list[Fading] = []
         self.energies = InterfaceEnergies()
         self.penalty: float | None = None
@@ -106,12 +114,67 @@ class InterfaceDynamics:
             self._touches[rows[has]] = pair.interface.contact
             if pair.friction is not None:
                 self._friction[rows[has]] = pair.friction[has]
-        # prescribed on all sides along the normal: no force could keep such a pair apart
-        self._fixed = np.nonzero(lumped.which >= 0)
-        self._fixed_column = lumped.which[self._fixed]
-        self._fixed_value = lumped.value[self._fixed]
+        self._fixed = np.flatnonzero(lumped.which.ravel() >= 0)
+        self._fixed_column = lumped.which.ravel()[self._fixed]
+        self._fixed_value = lumped.value.ravel()[self._fixed]
+        self._h = self._dt = 1.0
         self._acting = _Acting()
         self.set_ties(tied)
+
+    # -- motion --------------------------------------------------------------------------
+
+    @property
+    def u(self) -> Array:
+        """Displacement of the nodes, shape (n_nodes, gdim), length."""
+        return self._u.reshape(self._shape)
+
+    @u.setter
+    def u(self, values: Array) -> None:
+        self._u[:] = values.ravel()
+
+    @property
+    def v(self) -> Array:
+        """Velocity in the middle of the last increment, shape (n_nodes, gdim), length/time."""
+        return self._v.reshape(self._shape)
+
+    @v.setter
+    def v(self, values: Array) -> None:
+        self._v[:] = values.ravel()
+
+    @property
+    def a(self) -> Array:
+        """Acceleration of the present increment, shape (n_nodes, gdim), length/time^2."""
+        out = self._a
+        if self._more is not None:
+            out = out + self.lumped.accelerations(self._more)
+        return out.reshape(self._shape)
+
+    @property
+    def total(self) -> Array:
+        """Forces on the nodes with what tied slaves give them, shape (n_nodes, gdim), force."""
+        return self.lumped.collect(self.forces.copy())
+
+    @property
+    def forces(self) -> Array:
+        """Forces on the nodes, those of open pairs included, shape (n_nodes, gdim), force."""
+        out = self._forces if self._more is None else self._forces + self._more
+        return out.reshape(self._shape)
+
+    @property
+    def gap(self) -> Array:
+        """Jumps of the open rows at the start of the increment, shape (n_open, gdim), length."""
+        return self.lumped.jumps(self.u)
+
+    @property
+    def bonds(self) -> SofteningBonds:
+        """Laws of the softening bonds, up to date."""
+        self._live.store()
+        return self._bonds
+
+    @bonds.setter
+    def bonds(self, bonds: SofteningBonds) -> None:
+        self._bonds = bonds
+        self._live = LiveBonds(bonds, self.lumped)
 
     # -- ties and bonds ------------------------------------------------------------------
 
@@ -119,26 +182,37 @@ class InterfaceDynamics:
         """Tie some rows, shape (n_rows,), and prepare what depends on that."""
         lumped = self.lumped
         lumped.set_ties(tied)
+        if len(self._fixed):
+            self._fixed_push = Product(lumped.following[:, self._fixed])
+        self.set_frames()
+
+    def set_frames(self) -> None:
+        """Take the frames of the rows, which have turned, and prepare what depends on them."""
+        lumped = self.lumped
         rows = lumped.open
         self._normal = lumped.frames[rows][:, :, 0]
         self._compliance = np.einsum("nc,nc->n", lumped.compliance, self._normal**2)
         scale = self._compliance.max(initial=0.0)
+        # prescribed on all sides along the normal: no force could keep such a pair apart
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
         self._may_touch = np.flatnonzero(may_touch)
-        self._all_touch = len(self._may_touch) == len(rows)
+        self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
         self._gap = lumped.gap[rows] if np.any(lumped.gap[rows]) else None
+        self._closing_gap = lumped.gap[rows[self._may_touch]]
+        self._gaps = np.zeros(len(self._may_touch))
         self._mu = self._friction[rows]
         self._rough = bool(self._mu.any())
         self._soften()
 
     def _soften(self) -> None:
-        """Find the rows that soften among the open ones, and copy their constants."""
-        bonds, rows = self.bonds, self.lumped.open
-        self._soft = soft = np.flatnonzero(bonds.active[rows])
-        self._soft_rows = k = rows[soft]
-        self._e = bonds.direction[k]
-        self._soft_compliance = np.einsum("nc,nc->n", self.lumped.compliance[soft], self._e**2)
-        self._strength, self._final = bonds.strength[k], bonds.final[k]
+        """Find the bonds that soften among the open rows."""
+        if hasattr(self, "_live"):
+            self._live.store()
+        self._live = LiveBonds(self._bonds, self.lumped)
+        place = np.full(self.lumped.n_rows, -1, dtype=np.int64)
+        place[self.lumped.open] = np.arange(len(self.lumped.open))
+        self._place = place
+        self._soft = place[self._live.rows]
 
     def release(self, rows: Ints) -> None:
         """Untie rows; what holds them afterwards is given by the methods below."""
@@ -158,7 +232,7 @@ class InterfaceDynamics:
             energy: What each bond is to spend, shape (n,), force times length.
             area: Area that the release of each sweeps, shape (n,), length^2.
         """
-        bonds, size = self.bonds, np.linalg.norm(force, axis=1)
+        bonds, size = self._bonds, np.linalg.norm(force, axis=1)
         some = size > 0.0
         rows, size, force = rows[some], size[some], force[some]
         bonds.direction[rows] = -force / size[:, None]
@@ -172,42 +246,75 @@ class InterfaceDynamics:
     # -- one increment -------------------------------------------------------------------
 
     def accelerate(self, forces: Array, coordinates: Array, h: float, dt: float) -> None:
-        """Find the accelerations of the nodes and all interface forces.
+        """Find the motion of the nodes to the end of the increment, and all interface forces.
 
         Args:
-            forces: On the nodes, without those of interfaces, shape (n_nodes, gdim), force; not
-                kept.
+            forces: On the nodes, without those of interfaces, shape (n_nodes gdim,), force; kept
+                until the next call.
             coordinates: Prescribed displacements of the support columns at the end, shape
                 (n_columns,).
             h: Time from the last velocity to the next, time.
             dt: Increment, time.
         """
         lumped = self.lumped
-        self.total = total = lumped.collect(forces)
-        self.a = a = total * lumped.inverse
-        fixed: Array | None = None
-        if len(self._fixed_column):
+        self._forces, self._more, self._h, self._dt = forces, None, h, dt
+        a = lumped.accelerations.into(forces, self._a)
+        if len(self._fixed):
             target = self._fixed_value * coordinates[self._fixed_column]
-            fixed = ((target - self.u[self._fixed]) / dt - self.v[self._fixed]) / h
-            a[self._fixed] = fixed
-        lumped.follow(a)
-        self._acting = acting = self._open_forces(h, dt)
-        if acting.total is None:
-            return
-        lumped.push(total, acting.total)
-        np.multiply(total, lumped.inverse, out=a)
-        if fixed is not None:
-            a[self._fixed] = fixed
-        lumped.follow(a)
-
-    def _open_forces(self, h: float, dt: float) -> _Acting:
-        """Forces between the faces of open pairs."""
-        lumped, acting = self.lumped, _Acting()
+            self._given = ((target - self._u[self._fixed]) / dt - self._v[self._fixed]) / h
+            self._fixed_push.add(self._given, a)
+        x, y = self._free_motion()
+        self._acting = acting = _Acting()
         if not len(lumped.open):
-            self.gap = np.zeros((0, self.u.shape[1]))
-            return acting
-        self.gap = gap = lumped.jumps(self.u)
-        free = gap + dt * lumped.jumps(self.v + h * self.a)
+            return
+        if not self.fading and self.penalty is None:
+            live = self._live
+            if len(live):
+                acting.softening = pull = live.forces(self._u, x, dt * h)
+                live.push.add(-h * pull, y)
+                live.push.add((-h * dt) * pull, x)
+            if not self._overlaps(x):
+                if acting.softening is not None and not lumped.simple:
+                    self._more = lumped.on_nodes(self._of_live(acting.softening)).ravel()
+                return
+            if acting.softening is not None:
+                self._free_motion()
+        self._acting = acting = self._general(h, dt)
+        if acting.total is not None:
+            self._more = lumped.on_nodes(acting.total).ravel()
+            more = lumped.accelerations.into(self._more, self._work)
+            more *= h
+            y += more
+            more *= dt
+            x += more
+
+    def _free_motion(self) -> tuple[Array, Array]:
+        """Displacement and velocity at the end if no force acted on the open pairs."""
+        np.multiply(self._a, self._h, out=self._y)
+        self._y += self._v
+        np.multiply(self._y, self._dt, out=self._x)
+        self._x += self._u
+        return self._x, self._y
+
+    def _overlaps(self, x: Array) -> bool:
+        """Whether a pair in contact would overlap at a displacement, shape (n_nodes gdim,)."""
+        if not len(self._may_touch):
+            return False
+        gaps = self._closing.into(x, self._gaps)
+        if self._gap is not None:
+            gaps += self._closing_gap
+        return bool(gaps.min() < 0.0)
+
+    def _of_live(self, pull: Array) -> Array:
+        """Forces of the live bonds on the slave side of the open rows, shape (n_open, gdim)."""
+        out = np.zeros((len(self.lumped.open), self._shape[1]))
+        out[self._soft] = -pull[:, None] * self._live.direction
+        return out
+
+    def _general(self, h: float, dt: float) -> _Acting:
+        """All forces between the faces of open pairs."""
+        lumped, acting = self.lumped, _Acting()
+        free = lumped.jumps(self._x.reshape(self._shape))
         given = self._fading_forces(acting, dt)
         if given is not None:
             free = free + dt * h * lumped.response(given)
@@ -224,62 +331,72 @@ class InterfaceDynamics:
         """Forces of bonds that fall with time, shape (n_open, gdim)."""
         if not self.fading:
             return None
-        lumped = self.lumped
-        place = np.full(lumped.n_rows, -1, dtype=np.int64)
-        place[lumped.open] = np.arange(len(lumped.open))
         rows, forces = [], []
         for f in self.fading:
-            rows.append(place[f.rows])
+            rows.append(self._place[f.rows])
             forces.append(f.left(dt) * f.force)
         at, force = np.concatenate(rows), np.concatenate(forces)
         acting.fading = at, force
-        out = np.zeros_like(self.gap)
+        out = np.zeros((len(self.lumped.open), self._shape[1]))
         out[at] += force
         return out
 
     def _by_multipliers(self, acting: _Acting, free: Array, hh: float) -> Array | None:
-        """Softening forces and exact contact, shape (n_open, gdim); ``None`` where there is none.
+        """Softening forces, exact contact and friction, (n_open, gdim); ``None``: there is none.
 
         Args:
             acting: Filled in.
             free: Jumps at the end without these forces, shape (n_open, gdim), length.
             hh: dt h.
         """
-        soft, lumped = self._soft, self.lumped
+        soft, live, lumped = self._soft, self._live, self.lumped
         strength = np.zeros(len(soft))
         pressure = np.zeros(len(free))
+        holding: Array | None = None
+        gap = self.gap
+        here = (gap[soft] * live.direction).sum(axis=1)
         touch = self._may_touch[:0]
         forces: Array | None = None
         for sweep in range(SWEEPS):
             there = free
             if sweep and forces is not None:
                 there = free + hh * lumped.response(forces)
-            before, pressed = strength, pressure
+            before, pressed, held = strength, pressure, holding
             after = there
             if len(soft):
-                compliance = hh * self._soft_compliance
-                opening = (there[soft] * self._e).sum(axis=1) + compliance * strength
-                strength = self._softening(opening, compliance)
+                own = hh * live.coupling.diagonal()
+                opening = (there[soft] * live.direction).sum(axis=1) + own * strength
+                strength = live.alone(here, opening, hh)
                 # what this changes at once at its own place; the rest follows in the next sweep
                 after = there.copy()
-                pull = (before - strength)[:, None] * self._e
+                pull = (before - strength)[:, None] * live.direction
                 after[soft] += hh * lumped.compliance[soft] * pull
             pressure, touch = self._pressures(after, pressure, hh)
             if not len(soft) and not len(touch):
                 return None
             forces = pressure[:, None] * self._normal
-            forces[soft] -= strength[:, None] * self._e
+            forces[soft] -= strength[:, None] * live.direction
+            rough = self._rough and bool(len(touch))
+            if rough:
+                moved = after + hh * lumped.compliance * (
+                    (pressure - pressed)[:, None] * self._normal
+                )
+                holding = self._sticking(moved - gap, holding, touch, pressure, hh)
+                forces += holding
+            elif holding is not None:
+                holding = np.zeros_like(holding)
             if lumped.simple and not (len(soft) and pressure[soft].any()):
                 break  # every pair moves by itself, and softens or touches
-            if sweep and _settled(strength, before) and _settled(pressure, pressed):
-                break
+            if sweep and settled(strength, before) and settled(pressure, pressed):
+                if holding is None or held is None or settled(holding, held):
+                    break
         assert forces is not None
         if len(soft):
-            acting.softening = soft, -strength[:, None] * self._e
+            acting.softening = strength
         if len(touch):
             acting.contact = touch, pressure[touch, None] * self._normal[touch]
-            if self._rough:
-                forces = forces + self._sticking(acting, free, forces, pressure, hh)
+            if holding is not None:
+                acting.friction = touch, holding[touch]
         return forces
 
     def _pressures(self, jumps: Array, pressure: Array, hh: float) -> tuple[Array, Ints]:
@@ -296,55 +413,42 @@ class InterfaceDynamics:
         may = self._may_touch
         if not len(may):
             return pressure, may
-        gaps = self._normal_gaps(jumps) if self._all_touch else self._normal_gaps(jumps)[may]
-        old = pressure[may]
-        if not old.any():
-            if gaps.min() >= 0.0:
-                return pressure, may[:0]
-            new = np.maximum(-gaps / (hh * self._compliance[may]), 0.0)
-        else:
-            new = np.maximum(old - gaps / (hh * self._compliance[may]), 0.0)
+        gaps = self._normal_gaps(jumps)[may]
+        new = np.maximum(pressure[may] - gaps / (hh * self._compliance[may]), 0.0)
         out = np.zeros(len(pressure))
         out[may] = new
         return out, may[new > 0.0]
-
-    def _softening(self, without: Array, compliance: Array) -> Array:
-        """Forces of the softening bonds, shape (n_soft,).
-
-        Args:
-            without: Openings at the end without them, shape (n_soft,), length.
-            compliance: Of these openings, length/force.
-        """
-        k, bonds = self._soft_rows, self.bonds
-        here = (self.gap[self._soft] * self._e).sum(axis=1)
-        low = bonds.low[k]
-        change = 0.5 * (here + without) - low
-        top = bonds.top[k]
-        return softening_force(self._strength, self._final, low, top, change, 0.5 * compliance)
 
     def _normal_gaps(self, jumps: Array) -> Array:
         gaps = (jumps * self._normal).sum(axis=1)
         return np.asarray(gaps if self._gap is None else gaps + self._gap)
 
     def _sticking(
-        self, acting: _Acting, free: Array, forces: Array, pressure: Array, hh: float
+        self, moved: Array, before: Array | None, touch: Ints, pressure: Array, hh: float
     ) -> Array:
-        """Friction of the touching pairs, shape (n_open, gdim), force."""
-        assert acting.contact is not None
-        touch, lumped = acting.contact[0], self.lumped
-        out = np.zeros_like(free)
+        """Friction of the touching pairs, shape (n_open, gdim), force.
+
+        Args:
+            moved: Change of the jumps over the increment with the present forces, those of friction
+                among them, shape (n_open, gdim), length.
+            before: The present forces of friction, same shape; ``None``: none.
+            touch: Rows that touch, shape (m,).
+            pressure: Of all open rows, shape (n_open,), force.
+            hh: dt h.
+        """
+        out = np.zeros_like(moved)
         rough = touch[self._mu[touch] > 0.0]
         if not len(rough):
             return out
-        moved = (free + hh * lumped.response(forces) - self.gap)[rough]
-        n = self._normal[rough]
+        moved, n = moved[rough], self._normal[rough]
         slide = moved - (moved * n).sum(axis=1)[:, None] * n
         # masses that differ by component: the lightest one decides
-        holding = -slide / (hh * lumped.compliance[rough].max(axis=1))[:, None]
+        holding = -slide / (hh * self.lumped.compliance[rough].max(axis=1))[:, None]
+        if before is not None:
+            holding += before[rough]
         size = np.linalg.norm(holding, axis=1)
         limit = self._mu[rough] * pressure[rough]
-        holding *= np.minimum(1.0, limit / np.maximum(size, np.finfo(float).tiny))[:, None]
-        acting.friction = rough, holding
+        holding *= np.divide(limit, size, out=np.ones_like(size), where=size > limit)[:, None]
         out[rough] = holding
         return out
 
@@ -354,13 +458,12 @@ class InterfaceDynamics:
         may, self._may_touch = self._may_touch, self._may_touch[:0]
         forces = self._by_multipliers(acting, free, hh)
         self._may_touch = may
-        gaps = self._normal_gaps(self.gap)[may]
-        touch = may[gaps < 0.0]
+        overlap = np.minimum(self._normal_gaps(self.gap)[may], 0.0)
+        touch, overlap = may[overlap < 0.0], overlap[overlap < 0.0]
         if not len(touch):
             return forces
         stiffness = self.penalty / (hh * self._compliance[touch])
-        pressure = stiffness * -self._normal_gaps(self.gap)[touch]
-        push = pressure[:, None] * self._normal[touch]
+        push = (stiffness * -overlap)[:, None] * self._normal[touch]
         acting.contact = touch, push
         out = np.zeros_like(free) if forces is None else forces
         out[touch] += push
@@ -375,15 +478,21 @@ class InterfaceDynamics:
         """
         acting = self._acting
         if acting.total is not None:
-            lumped = self.lumped
-            work = h * lumped.jumps(self.v + 0.5 * h * self.a)
-            self._account(acting, work)
-        self.v += h * self.a
+            mean = (0.5 * h) * (self._v + self._y)
+            self._account(acting, self.lumped.jumps(mean.reshape(self._shape)))
         if acting.softening is not None:
-            self._follow_bonds(acting, work, dt)
+            live = self._live
+            self.energies.bonds += live.follow(acting.softening, self._u, self._v, self._y, h, dt)
+        self._u, self._x = self._x, self._u
+        self._v, self._y = self._y, self._v
         if self.fading:
             self.fading = older(self.fading, dt)
-        self.u += dt * self.v
+        if acting.softening is not None:
+            broken = self._live.broken()
+            if len(broken):
+                self._bonds.active[broken] = False
+                self._bonds.freed[broken] = True
+                self._soften()
 
     def _account(self, acting: _Acting, way: Array) -> None:
         """Add the work of the forces on the way of the open jumps, shape (n_open, gdim)."""
@@ -398,29 +507,30 @@ class InterfaceDynamics:
                 lost = -float(np.vdot(forces, way[rows]))
                 setattr(energies, name, getattr(energies, name) + lost)
 
-    def _follow_bonds(self, acting: _Acting, way: Array, dt: float) -> None:
-        """Openings, energies and ends of the softening bonds."""
-        assert acting.softening is not None
-        soft, forces = acting.softening
-        k, bonds = self._soft_rows, self.bonds
-        spent = -(forces * way[soft]).sum(axis=1)
-        self.energies.bonds += float(spent.sum())
-        middle = self.gap[soft] + 0.5 * dt * self.lumped.jumps(self.v)[soft]
-        low = (middle * self._e).sum(axis=1)
-        # by openings in the middle of increments, of which the first one counts whole
-        bonds.spent[k] += -(forces * self._e).sum(axis=1) * (low - bonds.low[k])
-        bonds.low[k] = low
-        bonds.top[k] = top = np.maximum(bonds.top[k], low)
-        done = top >= _FREE * self._final
-        if done.any():
-            bonds.active[k[done]] = False
-            bonds.freed[k[done]] = True
-            self._soften()
+    def chosen_bonds(self, rows: Ints) -> ChosenBonds:
+        """Prepare :meth:`bonds_at` for some tied rows, shape (n,)."""
+        return ChosenBonds(*self.lumped.bonds_of(rows, self._fixed))
+
+    def bonds_at(self, chosen: ChosenBonds) -> Array:
+        """Bond forces on the slaves of chosen rows, shape (n gdim,), force."""
+        more = self._more
+        out = chosen.by_forces(self._forces if more is None else self._forces + more)
+        if chosen.by_motion is not None:
+            chosen.by_motion.add(self._given, out)
+        return out
+
+    def moved(self, product: Product) -> Array:
+        """A product with the present displacement of the nodes, shape (n,)."""
+        return product(self._u)
 
     def open_forces(self) -> Array:
         """Forces on the slave side of the open rows, shape (n_open, gdim), force."""
-        total = self._acting.total
-        return np.zeros_like(self.gap) if total is None else total
+        acting = self._acting
+        if acting.total is not None:
+            return acting.total
+        if acting.softening is not None and len(acting.softening) == len(self._soft):
+            return self._of_live(acting.softening)
+        return np.zeros((len(self.lumped.open), self._shape[1]))
 
     def smallest_gap(self, rows: Bools) -> tuple[float, int]:
         """Smallest normal gap among some rows, and the row; 0 and -1 where none is open."""
@@ -432,9 +542,4 @@ class InterfaceDynamics:
         return float(gaps[i]), int(self.lumped.open[chosen[i]])
 
 
-def _settled(now: Array, before: Array) -> bool:
-    """Whether forces, shape (n,), no longer change from sweep to sweep."""
-    return bool(np.abs(now - before).max(initial=0.0) <= _SETTLED * np.abs(now).max(initial=0.0))
-
-
-__all__ = ["InterfaceDynamics", "InterfaceEnergies"]
+__all__ = ["ChosenBonds", "InterfaceDynamics", "InterfaceEnergies"]

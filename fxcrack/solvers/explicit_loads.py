@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.load_vectors import LoadPattern, load_vector, monitor_weights
 from fxcrack.continuum.loads import Load, Monitor
@@ -32,6 +32,8 @@ class LoadsAndMonitors:
         self._loads = [_load_pattern(continuum, load) for load in loads]
         self._monitors = [LoadPattern(monitor_weights(continuum, m)) for m in monitors]
         self._on_faces: list[Array] = []
+        self._at_chosen: list[LoadPattern] = []
+        self._elsewhere: list[LoadPattern] = []
 
     def take_faces(self, lumped: LumpedInterface) -> bool:
         """Find the forces of loads on slave nodes; whether there are any.
@@ -45,16 +47,42 @@ class LoadsAndMonitors:
         self._on_faces = found if has else []
         return has
 
-    def add_to(self, force: Array, factors: Array) -> None:
-        """Add the loads to forces on the owned dofs, shape (n_local,), in place.
+    def divide(self, chosen: Ints, inverse_mass: Array) -> None:
+        """Prepare :meth:`add_at_chosen` and :meth:`add_elsewhere`.
 
         Args:
-            force: The forces.
+            chosen: Owned dofs whose forces are wanted, shape (n_chosen,).
+            inverse_mass: One over the mass of the owned dofs, shape (n_local,).
+        """
+        self._at_chosen, self._elsewhere = [], []
+        for pattern in self._loads:
+            values = pattern.dense(self._n_local)
+            self._at_chosen.append(LoadPattern(values[chosen]))
+            values[chosen] = 0.0
+            self._elsewhere.append(LoadPattern(values * inverse_mass))
+
+    def add_at_chosen(self, forces: Array, factors: Array) -> None:
+        """Add the loads to the forces at the chosen dofs, shape (n_chosen,), in place.
+
+        Args:
+            forces: The forces.
             factors: Load factors, shape (n_forces,).
         """
-        for pattern, factor in zip(self._loads, factors.tolist(), strict=True):
-            if factor:
-                pattern.add(force, factor)
+        for pattern, factor in zip(self._at_chosen, factors.tolist(), strict=True):
+            if factor and len(pattern.values):
+                pattern.add(forces, factor)
+
+    def add_elsewhere(self, velocity: Array, factors: Array, h: float) -> None:
+        """Add what the loads do to the velocity of all other dofs, shape (n_local,), in place.
+
+        Args:
+            velocity: The velocity.
+            factors: Load factors, shape (n_forces,).
+            h: Time in which they act.
+        """
+        for pattern, factor in zip(self._elsewhere, factors.tolist(), strict=True):
+            if factor and len(pattern.values):
+                pattern.add(velocity, h * factor)
 
     def on_faces(self, factors: Array) -> Array:
         """Forces on the slave nodes, shape (n_rows, gdim), force."""

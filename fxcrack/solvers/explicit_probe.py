@@ -22,19 +22,27 @@ class InterfaceValues(Protocol):
         pairs: Interfaces.
         fronts: Their fronts.
         row_of: Row of each slave node per pair, -1 where it has no jump, shape (n_nodes,).
-        bonds: Forces of the bonds on the slaves, shape (n_rows + 1, gdim), force.
-        jumps: Jumps, shape (n_rows + 1, gdim), length.
-        face_loads: Forces of loads on the slave side, shape (n_rows + 1, gdim), force;
-            ``None`` where no load acts on any interface.
     """
 
     continuum: Continuum
     pairs: list[Pair]
     fronts: list[Front]
     row_of: list[Ints]
-    bonds: Array
-    jumps: Array
-    face_loads: Array | None
+
+    @property
+    def bonds(self) -> Array:
+        """Forces of the bonds on the slaves, shape (n_rows + 1, gdim), force."""
+
+    @property
+    def jumps(self) -> Array:
+        """Jumps, shape (n_rows + 1, gdim), length."""
+
+    @property
+    def face_loads(self) -> Array | None:
+        """Forces of loads on the slave side, shape (n_rows + 1, gdim), force.
+
+        ``None`` where no load acts on any interface.
+        """
 
     def displacements_of(self, where: list[Ints]) -> Array:
         """Mean displacements of sets of owned nodes, shape (n_sets, gdim); collective."""
@@ -76,9 +84,25 @@ class ExplicitFrontProbe:
         """Bond forces, tension positive, global vectors of shape (..., 3) [force]."""
         return -self._vectors(nodes, self._values.bonds)
 
+    def round_off(self, nodes: Ints, state: Any) -> Array:
+        """Nothing: forces of explicit dynamics are not searched for a load, shape (...) [force]."""
+        return np.zeros(np.shape(nodes))
+
     def jumps(self, nodes: Ints, state: Any) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""
         return self._vectors(nodes, self._values.jumps)
+
+    @property
+    def bodies(self) -> Any:
+        """Not to be integrated over: their state is no equilibrium.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError(
+            "method='domain' integrates over bodies in equilibrium, which explicit dynamics does "
+            "not have; use method='vcct'"
+        )
 
     @property
     def has_face_loads(self) -> bool:

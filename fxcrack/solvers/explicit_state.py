@@ -98,8 +98,8 @@ class MotionSnapshot:
         interfaces: State of the interfaces.
         at: Time of the displacement.
         last_dt: Length of the last increment, time.
-        sums: Work of supports and loads and energy of damping, sums over all ranks, and the energy
-            at the start; force times length.
+        sums: Work of supports and loads, energy of damping, energy at the start and energy gone
+            with changes of the increment, sums over all ranks; force times length.
         increments: How many were done.
     """
 
@@ -108,7 +108,7 @@ class MotionSnapshot:
     interfaces: InterfaceSnapshot
     at: float
     last_dt: float
-    sums: tuple[float, float, float]
+    sums: tuple[float, float, float, float]
     increments: int
 
 
@@ -141,11 +141,13 @@ class MotionFiles:
 
     def snapshot(self, arrays: Arrays) -> MotionSnapshot:
         """The state that :meth:`arrays` were made of, on any number of ranks; collective."""
-        at, last_dt, work, damped, initial, increments = arrays["motion"].astype(float).tolist()
+        at, last_dt, work, damped, initial, renewed, increments = (
+            arrays["motion"].astype(float).tolist()
+        )
         part = {k.removeprefix("interfaces."): v for k, v in arrays.items() if "interfaces." in k}
         return MotionSnapshot(
             self.scatter(arrays["displacement"]), self.scatter(arrays["velocity"]),
-            InterfaceSnapshot.from_arrays(part), at, last_dt, (work, damped, initial),
+            InterfaceSnapshot.from_arrays(part), at, last_dt, (work, damped, initial, renewed),
             int(increments),
         )  # fmt: skip
 

@@ -28,6 +28,7 @@ class PrescribedMotion:
         dofs: Those within the bodies, shape (n_dofs,).
         columns: Support column of all of them, shape (n_prescribed,).
         values: Entry of the column, shape (n_prescribed,).
+        holds_nodes: Whether any of them are at interfaces.
     """
 
     def __init__(self, supports: Supports, lumped: LumpedInterface, at_interface: Ints) -> None:
@@ -38,6 +39,7 @@ class PrescribedMotion:
         mine = np.zeros((len(lumped.nodes), 1), dtype=bool)
         mine[lumped.nodes.mine] = True
         self._nodes = np.nonzero((lumped.which >= 0) & mine)
+        self.holds_nodes = bool(len(self._nodes[0]))
         self.columns = np.concatenate([self._column, lumped.which[self._nodes]]).astype(np.int64)
         self.values = np.concatenate([self._value, lumped.value[self._nodes]])
 
@@ -58,7 +60,8 @@ class PrescribedMotion:
             owned: Of the owned dofs, shape (n_local,).
             nodes: Of the interface nodes, shape (n_nodes, gdim).
         """
-        return np.concatenate([owned[self.dofs], nodes[self._nodes]])
+        within = owned[self.dofs]
+        return np.concatenate([within, nodes[self._nodes]]) if self.holds_nodes else within
 
     def at_nodes(self, lumped: LumpedInterface, dynamics: InterfaceDynamics) -> Array:
         """Reactions at interface nodes, shape (n_prescribed - n_dofs,), force."""

@@ -12,6 +12,14 @@ from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.base import Solver
+from fxcrack.solvers.condensed_bodies import CondensedBodies
+
+_OF_PRODUCTS = 1e-11
+"""Round-off of a bond force as a part of the products it is the sum of, where no more is known."""
+
+_MOST_ROUND_OFF = 1e-6
+"""Largest relative round-off of an entry that counts here. Scenes with more have been warned of,
+and the bound exceeds forces that still hold two digits there."""
 
 _UNBOUNDED = 1e100
 """Jump per force of nodes that hold a body alone."""
@@ -30,6 +38,7 @@ class CondensedFrontProbe:
         self._p = p
         self.front: Front = solver.fronts[p]
         self.gdim: int = solver.continuum.gdim
+        self.bodies = CondensedBodies(solver)
 
     @property
     def pair(self) -> Pair:
@@ -44,6 +53,19 @@ class CondensedFrontProbe:
         values = np.zeros(solver.system.n_retained)
         values[rows] = -solver.system.forces(state, rows)
         return solver.vectors(self._p, nodes, values)
+
+    def round_off(self, nodes: Ints, state: Equilibrium) -> Array:
+        """How large bond forces may be by round-off alone, shape (...) [force]."""
+        system = self._solver.system
+        index = self._solver.index[self._p][nodes]
+        x = np.abs(np.concatenate([state.jump, state.loads]))
+        # an entry S_ij is off by what those on the diagonal of the bodies' matrix allow
+        relative = np.minimum(system.cholesky.round_off, _MOST_ROUND_OFF)
+        error = np.broadcast_to(relative, len(system.schur))
+        each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
+        if not each.any() and system.n_retained:
+            each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
+        return np.asarray(each[np.where(index >= 0, index, -1)].max(axis=-1))
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""

@@ -18,19 +18,20 @@ class StoredEnergy:
 
     Attributes:
         largest: The largest one in an accepted state of which it was known on acceptance.
+        most: The largest one in any accepted state: what is left of it is round-off.
     """
 
     def __init__(self, bodies: WeakForm) -> None:
         self._bodies = bodies
         self.largest = 0.0
-        self._most = 0.0  # in any accepted state: what is left of it is round-off
+        self.most = 0.0
         self._now: dict[str, float] | None = None  # of the accepted state, once asked for
 
     def now(self) -> dict[str, float]:
         """Energies of the accepted state, which the bodies are in, by name; collective."""
         if self._now is None:
             self._now = self._bodies.stored()
-        self._most = max(self._most, sum(self._now.values()))
+        self.most = max(self.most, sum(self._now.values()))
         return self._now
 
     def accept(self, energies: dict[str, float] | None) -> None:
@@ -44,6 +45,9 @@ class StoredEnergy:
 
     def imbalance(self, trial: TrialIncrement, n_forces: int, more: float, part: float) -> str:
         """Find and keep the energies of a trial, and compare them with its work; collective.
+
+        Bodies that yield are integrated by the trapezoidal rule, which their energies fulfil
+        exactly: what is off there is the work of faces that close or open within the increment.
 
         Args:
             trial: The trial, its work known; the bodies are in its state.
@@ -59,9 +63,9 @@ class StoredEnergy:
         trial.energies = self._bodies.stored()
         before, after = (sum(e.values()) for e in (self._now, trial.energies))
         given = work.external_work(n_forces) + self._bodies.path_work() + more
-        off = given - (after - before) - work.bonds - work.friction
+        off = given - (after - before) - work.bonds - work.friction - self._bodies.path_spent()
         size = max(after, self.largest)
-        allowed = part * (size if part < ANOTHER else max(size, self._most))
+        allowed = part * (size if part < ANOTHER else max(size, self.most))
         if not abs(off) > allowed + trial.noise:
             return ""
         return f"the energies of an increment are off by {off:.2e} beside {size:.2e} stored"

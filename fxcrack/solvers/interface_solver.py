@@ -18,6 +18,7 @@ import numpy.typing as npt
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.timings import Timings
+from fxcrack.condensation.free_bodies import FreeBodies
 from fxcrack.condensation.iterative import Roles
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.condensation.retained import ColumnCost, CostModel, choose_roles
@@ -29,7 +30,7 @@ from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.friction_state import release_to_contact
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState, allow_contact
 from fxcrack.interface.front import Front
-from fxcrack.interface.jump_coordinates import JumpCoordinates, global_vectors
+from fxcrack.interface.jump_coordinates import FIXED, JumpCoordinates, global_vectors
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.base import Solver
@@ -123,6 +124,7 @@ class InterfaceSolver(ABC):
         self._resumed: InterfaceState | None = None
         self._roles: Roles = []
         self._resumed_roles: Roles | None = None
+        self._free_bodies: tuple[JumpCoordinates, FreeBodies] | None = None
 
     # -- the retained jumps --------------------------------------------------------------
 
@@ -143,6 +145,9 @@ class InterfaceSolver(ABC):
             before: The state, which the system is in.
             force: Its given forces, shape (n_retained,).
         """
+
+    def begin_motion(self, dt: float) -> None:  # noqa: B027 - bodies at rest have nothing to do
+        """See :meth:`fxcrack.solvers.base.Solver.begin_motion`."""
 
     @abstractmethod
     def start(self) -> None:
@@ -274,6 +279,22 @@ class InterfaceSolver(ABC):
             gdim=self.continuum.gdim,
         )
 
+    def restraint(self, roles: Roles, coordinates: JumpCoordinates) -> FreeBodies:
+        """What holds the bodies on a set of retained jumps.
+
+        Args:
+            roles: Roles of the jumps.
+            coordinates: Their numbering.
+        """
+        if self._free_bodies is None or self._free_bodies[0] is not coordinates:
+            bonded = [role == FIXED for role in roles]
+            parts = self.continuum, self.supports, self.pairs, bonded
+            found = FreeBodies(*parts, coordinates.index, coordinates.frames)
+            if self._free_bodies is not None:
+                found.warned = self._free_bodies[1].warned
+            self._free_bodies = coordinates, found
+        return self._free_bodies[1]
+
     # -- bonds ---------------------------------------------------------------------------
 
     def soften(self, p: int, units: Sequence[CohesiveUnit]) -> None:
@@ -360,7 +381,7 @@ class InterfaceSolver(ABC):
         for bond in self.system.soft.bonds:
             pair, members, _ = bond.where
             if pair == p:
-                left = bond.force(bond.opening(self.state.jump)) / bond.strength
+                left = bond.remaining(bond.opening(self.state.jump))
                 nodes.append(members)
                 fractions.append(np.full(len(members), left))
         return np.concatenate(nodes), np.concatenate(fractions)

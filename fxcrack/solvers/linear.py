@@ -127,6 +127,7 @@ class LinearSolver(InterfaceSolver):
         coordinates = found.coordinates
         n_forces = len(self.loads)
         system = ContactSystem(found.schur, coordinates.n_retained, self.n_loads, n_forces)
+        system.cholesky.restraint = self.restraint(roles, coordinates)
         if self.columns is None:
             # a body that is nearly incompressible has a much larger diagonal than S
             system.cholesky.round_off = _ROUND_OFF * np.abs(direct.diagonal)
@@ -144,8 +145,9 @@ class LinearSolver(InterfaceSolver):
         self.timings.add("transform", start)
         start = time.perf_counter()
         found = DirectCondensation(
-            stiffness, coordinates, self.borders, self.timings, method=self.options.method
-        )
+            stiffness, coordinates, self.borders, self.timings, method=self.options.method,
+            doubt=self.restraint(roles, coordinates).judge,
+        )  # fmt: skip
         seconds = self.continuum.comm.bcast(time.perf_counter() - start)
         assert isinstance(self._cost, CostModel)
         self._cost.observe(coordinates.n_retained, seconds)

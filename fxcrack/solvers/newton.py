@@ -24,6 +24,7 @@ from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.can_fly import can_fly
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
 from fxcrack.solvers.increment_work import (
@@ -70,6 +71,7 @@ class NewtonSolver(InterfaceSolver):
         pairing: Energy that new pairings of faces that slide have taken.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
+        free_start: Whether the motion began without an equilibrium, see :meth:`begin_motion`.
     """
 
     def __init__(
@@ -104,7 +106,7 @@ class NewtonSolver(InterfaceSolver):
         self.largest_force = 0.0
         self.energy = StoredEnergy(bodies)
         self.pairing = PairingEnergy()
-        self.exact = False
+        self.exact = self.free_start = False
         self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._trial: TrialIncrement | None = None
@@ -123,6 +125,8 @@ class NewtonSolver(InterfaceSolver):
         )
         self.timings.add("transform", start)
         self.bodies.set(self.u)
+        if not self.bodies.dynamic:  # inertia holds every body
+            tangent.restraint = self.restraint(roles, coordinates)
         if self._resumed_tangent is None:
             tangent.condense(coordinates)
         else:
@@ -131,6 +135,7 @@ class NewtonSolver(InterfaceSolver):
             tangent.condensation.schur, coordinates.n_retained, self.n_loads, n_forces,
             offset=np.zeros(coordinates.n_last),
         )  # fmt: skip
+        system.cholesky.restraint = tangent.restraint
         residual = tangent.out_of_balance(loads)
         jump = self.interfaces.jumps(self.u, coordinates)
         tangent.anchor(system, residual, jump, loads).destroy()
@@ -179,11 +184,27 @@ class NewtonSolver(InterfaceSolver):
 
     # -- trials --------------------------------------------------------------------------
 
+    def begin_motion(self, dt: float) -> None:
+        """Let bodies with inertia that nothing holds begin without an equilibrium; collective.
+
+        Before an increment of time the tangent holds no inertia, so that it is singular where a
+        body can move freely. There is then no equilibrium to begin with, and loads that are there
+        from the first moment are applied within the first increment.
+
+        Args:
+            dt: Length of the first increment, time.
+        """
+        inertia = self.bodies.inertia
+        if inertia is not None and can_fly(self.continuum, self.supports, self.pairs, self.fronts):
+            self.free_start = True
+            inertia.expect(dt)
+
     def start(self) -> None:
         """Find the equilibrium without loads; collective."""
         zero = np.zeros(self.system.n_retained)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
-        self._solve(zero)
+        if not self.free_start:
+            self._solve(zero)
 
     def _solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
@@ -222,7 +243,7 @@ class NewtonSolver(InterfaceSolver):
         Raises:
             ConvergenceError: None was found; the accepted state is in force again.
         """
-        if self.bodies.closed:
+        if self.bodies.accountable:
             self.energy.now()
         self._before = self.interface_state()
         dynamic = self.bodies.dynamic
@@ -251,8 +272,8 @@ class NewtonSolver(InterfaceSolver):
         Collective.
 
         Args:
-            strict: Refuse an increment whose energies do not balance to the tolerance, where bodies
-                store all work; else one that is off by more than a part of them that no equilibrium
+            strict: Refuse an increment whose energies do not balance to the tolerance, where they
+                are known; else one that is off by more than a part of them that no equilibrium
                 on the way could be, or none at all (``None``).
 
         Raises:
@@ -266,7 +287,7 @@ class NewtonSolver(InterfaceSolver):
         except NotPositiveDefinite as error:
             self._fail()
             raise ConvergenceError(_UNSTABLE) from error
-        if strict is not None and trial.iterations and self.bodies.closed:
+        if strict is not None and trial.iterations and self.bodies.accountable:
             overlap = self._overlap_work(trial.points[0][1], trial.end)
             part = self.newton.balance if strict else ANOTHER
             off = self.energy.imbalance(trial, len(self.loads), overlap, part)
@@ -434,15 +455,15 @@ class NewtonSolver(InterfaceSolver):
 
         Returns:
             What :meth:`InterfaceSolver.collect` gives; on rank 0 bodies.* of
-            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (4,); and the
+            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (5,); and the
             tangent, see :func:`~fxcrack.solvers.newton_state.tangent_arrays`.
         """
         out = super().collect()
         out |= {f"bodies.{name}": values for name, values in self.bodies.state().items()}
         for p, known in enumerate(self.interfaces.pairing()):
             out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
-        drift, energy = self.tangent.drift, self.energy.largest
-        out["sums"] = np.array([self.pairing.energy, self.largest_force, energy, drift])
+        sums = self.pairing.energy, self.largest_force, self.energy.largest, self.tangent.drift
+        out["sums"] = np.array([*sums, self.energy.most])
         out |= tangent_arrays(self.tangent, self.system, self.face_loads)
         return out
 
@@ -467,7 +488,8 @@ class NewtonSolver(InterfaceSolver):
         self.interfaces.move_fronts(self.u)
         self.at = time
         sums = (float(x) for x in arrays["sums"])
-        self.pairing.energy, self.largest_force, self.energy.largest, drift = sums
+        self.pairing.energy, self.largest_force, self.energy.largest, drift, *most = sums
+        self.energy.most = most[0] if most else self.energy.largest  # earlier ones did not have it
         super().resume(arrays, time)
         assert self._resumed is not None
         self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, drift)
@@ -525,8 +547,23 @@ class NewtonSolver(InterfaceSolver):
         return self.bodies.work()
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
-        """Accepted displacement; the caller destroys it."""
-        return self.u.copy()
+        """Displacement of a state; collective; the caller destroys it.
+
+        Args:
+            state: The accepted state (the default), the last trial, or one that the tangent
+                predicts from the accepted state.
+        """
+        if state is None or state is self.state:
+            return self.u.copy()
+        if self._trial is not None and state is self._trial.end:
+            return self._trial.u.copy()
+        here, n = self.state, self.system.n_retained
+        last = np.zeros(self.tangent.coordinates.n_last)
+        last[:n] = state.jump - here.jump
+        last[n : n + self.n_loads] = state.loads - here.loads
+        out = self.tangent.condensation.displacement(last)
+        out.axpy(1.0, self.u)
+        return out
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them."""

@@ -77,6 +77,11 @@ class Counts:
     residuals: list[float] = field(default_factory=list)
 
 
+def _part(norm: float, forces: float) -> float:
+    """A residual over the forces in the bodies; 1 at most where these are zero, as in flight."""
+    return norm / (forces or norm or 1.0)
+
+
 class InterfaceSnes:
     """What SNES asks of the bodies and their interfaces at a trial y.
 
@@ -155,6 +160,8 @@ class InterfaceSnes:
             return True
         if self._steps_since == 0:
             return self.norms[-1] > _NEAR * self.scale
+        if not self.norms[-2] > 0.0:
+            return False  # where nothing acts, all that is left is round-off
         rate = self.norms[-1] / self.norms[-2]
         if self.fraction != 1.0 or rate >= _SLOW:
             return True
@@ -226,7 +233,7 @@ class InterfaceSnes:
         jump = self._jumps_of(y)
         if self._linearise(jump, self._residual, out):
             self.renewed, self._steps_since = True, 0
-            self.drift = self.norms[-1] / self.scale
+            self.drift = _part(self.norms[-1], self.scale)
         else:
             self._reused += 1
         self._steps_since += 1
@@ -297,8 +304,9 @@ class InterfaceSnes:
         self.norms.append(norm)
         self.level = level
         if its == 0:
-            self.drift = norm / self.scale if norm > level else 0.0
-        if norm <= level and self.fraction == 1.0 and (its > 0 or self.motion is None):
+            self.drift = _part(norm, self.scale) if norm > level else 0.0
+        whole = self.fraction == 1.0 or norm == 0.0  # no step is taken where nothing acts
+        if norm <= level and whole and (its > 0 or self.motion is None):
             return int(PETSc.SNES.ConvergedReason.CONVERGED_FNORM_ABS)
         if its - self._reused >= self.options.max_iterations:
             return int(PETSc.SNES.ConvergedReason.DIVERGED_MAX_IT)

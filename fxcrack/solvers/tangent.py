@@ -16,6 +16,7 @@ from fxcrack.base.errors import SolverError
 from fxcrack.base.timings import Timings
 from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
 from fxcrack.condensation.direct import DirectCondensation
+from fxcrack.condensation.free_bodies import FreeBodies
 from fxcrack.condensation.rigid_motions import check_held
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.weak_form import WeakForm
@@ -68,6 +69,7 @@ class CondensedTangent:
         drift: How far the tangent at hand is off at the accepted state: what was out of balance
             where it was made, over the forces.
         origin: Where the one at hand was made, ``None`` for bodies that have no history.
+        restraint: What holds the bodies; ``None`` where nothing must.
     """
 
     def __init__(
@@ -94,6 +96,8 @@ class CondensedTangent:
         self._spare: DirectCondensation | None = None  # whose memory the next tangent takes
         self._stiff = 0.0  # norm of K
         self.origin: Origin | None = None
+        self.restraint: FreeBodies | None = None
+        self._first = True  # whether no tangent was made yet
 
     def assemble(self, followed: list[Ints]) -> int:
         """Compile the forms and make the borders on first use; collective.
@@ -108,7 +112,8 @@ class CondensedTangent:
         if self._borders is None:
             continuum = self.bodies.continuum
             start = time.perf_counter()
-            check_held(continuum, self._supports)
+            if not self.bodies.dynamic:  # inertia holds every body
+                check_held(continuum, self._supports)
             self.bodies.compile()
             self.timings.add("compile", start)
             start = time.perf_counter()
@@ -187,7 +192,7 @@ class CondensedTangent:
             if free is None:
                 free = DirectCondensation(
                     matrix, self.coordinates, self.borders, self.timings,
-                    method=method, definite=False, renewable=True,
+                    method=method, definite=False, doubt=self._doubt, renewable=True,
                 )  # fmt: skip
             else:
                 free.renew(matrix)
@@ -195,11 +200,20 @@ class CondensedTangent:
             self._spare = free
             self._drop_spare()
             raise
-        self._condensation = free
+        self._condensation, self._first = free, False
         self._version, self.drift = self.bodies.version, 0.0
         if self.bodies.path_dependent:
             self.origin = Origin(self.bodies.snapshot(), self.bodies.began)
         self._stiff = float(stiffness.norm(PETSc.NormType.NORM_INFINITY))
+
+    def _doubt(self, ratio: float) -> None:
+        """Refuse a tangent with small pivots where a body is free; at limit points it is not."""
+        if self.restraint is None:
+            return
+        if self._first:  # of bodies that no load has brought near a limit yet
+            self.restraint.judge(ratio)
+        else:
+            self.restraint.check()
 
     def _drop_spare(self) -> None:
         if self._spare is not None:

@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Ints
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion
@@ -117,8 +117,9 @@ class Crack:
             return TipValues(tips, np.zeros(0), {})
         measured = self.evaluator.measure(tips, state, time)
         f, report = self.evaluator.value(tips, measured)
-        for other in self.watched:
-            report = {**other.value(tips, other.measure(tips, state, time))[1], **report}
+        for criterion, other in zip(self.debond.watch, self.watched, strict=True):
+            found = other.value(tips, other.measure(tips, state, time))[1]
+            report = {**_named_apart(found, report, criterion), **report}
         return TipValues(tips, f, report, measured, state)
 
     def look_for_overlap(self, tips: Tips, state: Equilibrium) -> None:
@@ -207,6 +208,21 @@ class Crack:
         """Record slave nodes that are about to be released, shape (n,)."""
         self.n_released += len(nodes)
         self.records += release_records(self, nodes, values, state, time)
+
+
+def _named_apart(
+    found: dict[str, Array], report: dict[str, Array], criterion: Criterion
+) -> dict[str, Array]:
+    """What a watched criterion reports, with the method in names that are taken already.
+
+    Args:
+        found: Its quantities by name.
+        report: What is reported so far.
+        criterion: The criterion.
+    """
+    method = getattr(criterion, "method", type(criterion).__name__)
+    names = {name: f"{name}_{method}" if name in report else name for name in found}
+    return {names[name]: values for name, values in found.items() if names[name] not in report}
 
 
 def make_evaluator(

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Bools
 from fxcrack.criteria import CycleRates
+from fxcrack.criteria.ligaments import Ligaments
 
 
 @dataclass(frozen=True)
@@ -41,6 +42,7 @@ class FatigueState:
         N: Cycles so far, over all steps.
         waiting: Per pair, slave nodes at which onset is still to come, shape (n_nodes,).
         credit: Per pair, growth within the element of each slave node, shape (n_nodes,), length.
+        ligaments: Per pair, elements that fronts have passed in part.
         table: One entry per tip and stabilised cycle in each column: N and the crack length at
             its beginning (of the tip in 2-D, the mean of the front in 3-D), the values of
             :class:`TipCycle` there, and whether the tip was released at its end.
@@ -49,6 +51,7 @@ class FatigueState:
     N: float = 0.0
     waiting: dict[int, Bools] = field(default_factory=dict)
     credit: dict[int, Array] = field(default_factory=dict)
+    ligaments: dict[int, Ligaments] = field(default_factory=dict)
     table: dict[str, list[float | int | str | bool]] = field(
         default_factory=lambda: {name: [] for name in _COLUMNS}
     )
@@ -65,6 +68,7 @@ class FatigueState:
             self.waiting[p] = np.zeros(n_nodes, dtype=np.bool_)
             self.waiting[p][front] = True
             self.credit[p] = np.zeros(n_nodes)
+            self.ligaments[p] = Ligaments.none(n_nodes)
 
     def tabulate(
         self,

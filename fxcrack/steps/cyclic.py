@@ -53,6 +53,13 @@ from fxcrack.steps.element_growth import (
 )
 from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.load_path import LoadPath
+from fxcrack.steps.partial_growth import (
+    Block,
+    PartialGrowth,
+    attach_ligaments,
+    grows_in_part,
+    passed_area,
+)
 from fxcrack.steps.release import release_tips
 from fxcrack.steps.rows import load_columns
 from fxcrack.steps.static import Static
@@ -104,6 +111,7 @@ class _Cycling:
         self._cycles = cycles
         self._limit = analysis.fatigue.N + cycles.n_max
         self._seen: list[TipCycle] = []
+        self._partly = False
         columns = load_columns(analysis.solver)
         names = [load if moves else answer for load, answer, moves in columns]
         self._corners = cycles.corners(analysis.loads_at, analysis.load_breaks(), names)
@@ -116,6 +124,12 @@ class _Cycling:
         else:
             top, event, self._limit = resume["top"], resume["event"], resume["limit"]
             self._begin_at(top)
+        self._partly = grows_in_part(self._analysis)
+        partly = None
+        if self._partly:
+            partly = PartialGrowth(self._analysis, self._stabilised_cycle, self._limit)
+        attach_ligaments(self._analysis)
+        self._analysis.evaluate_tips()
         known = False
         while True:
             driver.checkpoint_point(event=event, top=top, limit=self._limit)
@@ -125,15 +139,20 @@ class _Cycling:
             reason = driver.ended()
             if reason:
                 return reason
-            jump = self._grow()
+            jump: CycleJump | Block
+            if partly is not None:
+                jump = partly.until_release(self._seen)
+                self._seen = jump.seen
+            else:
+                jump = self._grow()
             if jump.event in ("arrest", "limit"):
                 driver.record(jump.event)
                 if jump.event == "limit":
                     return f"{self._cycles.n_max:g} cycles done"
                 return "arrest: no tip grows, however many cycles follow"
             event = "unstable" if jump.event == "unstable" else "release"
-            known = event == "release"
-            if not known:
+            known = event == "release" or self._partly
+            if isinstance(jump, CycleJump) and not known:
                 self._seen = []
                 self._release(jump.release, fatigue.N)
 
@@ -144,6 +163,16 @@ class _Cycling:
             if len(v.tips):
                 for name in ("G_max", "dG", "dadN"):
                     row[f"{name}[{g.title}]"] = float(cycle.column(name)[v.largest])
+        if self._partly:
+            for g, v in self._analysis.at_tips():
+                passed = passed_area(self._analysis, g, v)
+                area = g.extent.area(v.tips) + passed
+                row[f"area[{g.title}]"] = area
+                grown = g.extent.over_front(passed)
+                if g.front.surface.dim == 1:
+                    part = self._analysis.fatigue.ligaments[g.p].part[v.tips.node]
+                    grown = float((part * advance(v.tips)).max(initial=0.0))
+                row[f"a[{g.title}]"] = g.extent.length(v.tips) + grown
         return row
 
     # -- one cycle -----------------------------------------------------------------------

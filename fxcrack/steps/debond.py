@@ -90,6 +90,13 @@ class Debond:
                 f"{'' if self.criterion.knows_toughness else ', which knows no toughness'}; use "
                 f"{release_laws.names_of(possible)}"
             )
+        gradual = self.release.driver != "once" or self.criterion.softens
+        if gradual and any(c.needs_free_faces for c in (self.criterion, *self.watch)):
+            raise InputError(
+                f"{where}: method='domain' needs crack faces without bond forces, which a gradual "
+                "release leaves behind the tip; use StepRelease() (and VCCT), or method='vcct' or "
+                "method='closure'"
+            )
         try:
             self.criterion.check_bond(normal_only=self.interface.normal_only)
         except InputError as error:
@@ -119,7 +126,7 @@ def check_criterion(where: str, criterion: Criterion) -> None:
 
 
 def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
-    """Refuse bonds that soften with their opening beside friction.
+    """Refuse bonds that soften with their opening beside friction, but for explicit dynamics.
 
     Raises:
         InputError: A debond has such a release law.
@@ -129,9 +136,9 @@ def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
         if rough and softens(debond):
             raise InputError(
                 f"interface '{debond.interface.title}' is released progressively with its opening, "
-                f"which is not possible beside friction (interface '{rough[0]}'); use "
-                "StepRelease(), RampRelease(increments=...) or AmplitudeRelease(...), or leave "
-                "friction out"
+                f"which is not possible beside friction (interface '{rough[0]}') but in explicit "
+                "dynamics; use StepRelease(), RampRelease(increments=...) or "
+                "AmplitudeRelease(...), leave friction out, or take an Explicit step"
             )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from fxcrack.base import log
 from fxcrack.base.errors import ComesApart, ConvergenceError, EnergyImbalance, InputError
 from fxcrack.base.timings import Timings
+from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Row
 from fxcrack.solvers.newton import NewtonSolver
@@ -134,6 +135,8 @@ class StepDriver:
     def _apply_loads(self) -> None:
         """Apply loads that are there from the first moment of the step, in proportion."""
         analysis = self.analysis
+        if isinstance(analysis.solver, NewtonSolver) and analysis.solver.free_start:
+            return  # the first increment applies them
         wanted, present = analysis.loads_at(analysis.time), analysis.solver.state.loads
         if np.abs(wanted - present).max(initial=0.0) > 1e-12 * np.abs(wanted).max(initial=0.0):
             self.path.over_increment(analysis.time)
@@ -203,6 +206,8 @@ def _separated(error: NotPositiveDefinite | ComesApart) -> str:
         if isinstance(error, ComesApart)
         else "releasing the next node would leave a body unsupported"
     )
+    if isinstance(error, NotPositiveDefinite) and error.why == HELD_BY_ROUND_OFF:
+        what = f"releasing the next node, {error.why}"
     reason = f"total separation: {what}; the step ends in the last equilibrium before it"
     log.warn("%s", reason)
     return reason

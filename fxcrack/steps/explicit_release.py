@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.sparse import Product
 from fxcrack.criteria import ProgressiveRelease, ReleaseLaw
 from fxcrack.criteria.closure_lengths import uneven
 from fxcrack.criteria.crack_closure import closure_weights
@@ -21,6 +22,7 @@ from fxcrack.criteria.mixed_mode import least_critical
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.explicit_bonds import Fading
+from fxcrack.solvers.explicit_interface import ChosenBonds
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.debond import Debond
 
@@ -41,19 +43,17 @@ class _Screen:
 
     Attributes:
         tips: The front.
-        rows: Interface rows of its nodes, shape (n,).
-        wake: Rows of the wake nodes, shape (n, 2).
-        weights: Their weights, shape (n, 2, 1).
+        forces: Bond forces at its nodes.
+        openings: Openings behind it by the motion of the nodes, (n gdim, n_nodes gdim).
         bound: Square of |F| |w| below which f is below the onset, shape (n,).
-        placed: Position of the front for which this holds.
+        version: Position of the front and ties for which this holds.
     """
 
     tips: Tips
-    rows: Ints
-    wake: Ints
-    weights: Array
+    forces: ChosenBonds
+    openings: Product
     bound: Array
-    version: tuple[int, int]
+    version: tuple[int, int, int]
 
 
 class ReleaseControl:
@@ -76,15 +76,17 @@ class ReleaseControl:
 
     def _present(self) -> _Screen:
         crack, front = self._crack, self._crack.front
-        version = front.version, front.placed
+        lumped = self._solver.lumped
+        version = front.version, front.placed, lumped.version
         if self._screen is None or self._screen.version != version:
             tips = crack.tips()
             if len(tips):
                 crack.check_wake(tips)
             row_of = self._solver.row_of[crack.p]
+            behind = lumped.mean_jumps(row_of[tips.wake_nodes[:, 0]], tips.wake_weights[:, 0])
             self._screen = _Screen(
-                tips, row_of[tips.node], row_of[tips.wake_nodes[:, 0]],
-                tips.wake_weights[:, 0, :, None], self._bounds(tips), version,
+                tips, self._solver.dynamics.chosen_bonds(row_of[tips.node]),
+                behind, self._bounds(tips), version,
             )  # fmt: skip
         return self._screen
 
@@ -112,11 +114,16 @@ class ReleaseControl:
         screen = self._present()
         if not len(screen.tips):
             return None
-        solver = self._solver
-        force = solver.bonds[screen.rows]
-        opening = (solver.jumps[screen.wake] * screen.weights).sum(axis=1)
-        product = (force * force).sum(axis=1) * (opening * opening).sum(axis=1)
-        if not np.any(product >= screen.bound):
+        dynamics, n = self._solver.dynamics, len(screen.tips)
+        force, opening = dynamics.bonds_at(screen.forces), dynamics.moved(screen.openings)
+        if n == 1:
+            below = (force @ force) * (opening @ opening) < screen.bound[0]
+        else:
+            force *= force
+            opening *= opening
+            products = force.reshape(n, -1).sum(axis=1) * opening.reshape(n, -1).sum(axis=1)
+            below = not np.any(products >= screen.bound)
+        if below:
             return None
         values = self.values()
         return values if values.f.max() >= self.onset else None

@@ -102,6 +102,11 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 f"interface '{interface.title}': bonds of explicit dynamics hold in all "
                 "directions; leave normal_only out"
             )
+        if interface.pairing == "surface-to-surface":
+            raise InputError(
+                f"interface '{interface.title}': surface-to-surface weights would give lumped "
+                "masses of masters below zero; leave pairing out in explicit dynamics"
+            )
     for interface in bonds:
         if interface.bonded is not None:
             log.warn(

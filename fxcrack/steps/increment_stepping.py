@@ -56,7 +56,8 @@ def step_by_increments(driver: StepDriver) -> str:
             )
         if analysis.time > BEYOND and driver.end_time >= LARGE:
             return "the criterion is not reached however large the load becomes"
-        control.size = max(control.size, min(_scaled(analysis, step), step.maximum))
+        if not control.cutbacks:  # a load that is not proportional may have been overshot
+            control.size = max(control.size, min(_scaled(analysis, step), step.maximum))
         met = _met_at_start(analysis)
         smallest = neutral or any(met)
         size = step.minimum if smallest else control.size

@@ -23,7 +23,7 @@ def release_critical(analysis: Analysis, *, all_ready: bool = False) -> None:
     """Release the critical nodes and find the tips anew; collective.
 
     Args:
-        analysis: The analysis, some f of it at least 1.
+        analysis: The analysis, some f of it at least 1 as far as the path resolves it.
         all_ready: Release all nodes whose f is in the release range of their criterion, not only
             those of the largest f.
     """
@@ -32,7 +32,7 @@ def release_critical(analysis: Analysis, *, all_ready: bool = False) -> None:
         if all_ready:
             chosen = np.flatnonzero(v.f >= g.criterion.release_range[0])
         elif v.f.max(initial=0.0) >= critical:
-            chosen = g.ready(v)
+            chosen = g.ready(v, critical)
         else:
             continue
         if len(chosen):

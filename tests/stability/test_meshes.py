@@ -64,9 +64,10 @@ def test_spacing(name: str, method: str) -> None:
     and opening tell it there.
     """
     upper, lower, ny, rtol = SPACINGS[name]
-    count = int(np.sum((upper >= A0 - 1e-9) & (upper <= TO + 1e-9)))
     criterion = fx.VCCT(GIc=0.2, method=method)
     scene = specimen(arms(upper=upper, lower=lower, ny=ny), a0=A0, criterion=criterion)
+    nodes = scene.pairs[0].surface.x[:, 0]  # of the coarser side where meshes do not match
+    count = int(np.sum((nodes >= A0 - 1e-9) & (nodes <= TO + 1e-9)))
     history = grown(scene, count)
     assert history.reason == f"{count} nodes released"
     lengths = history["a[bond]"]
@@ -74,7 +75,8 @@ def test_spacing(name: str, method: str) -> None:
         rates, energies = released_energies(history)
         grown_by = np.diff(lengths)[history["event"][1:] == "release"]
         assert energies == pytest.approx(rates * grown_by, rel=1e-6) and len(rates) == count
-        assert rates.min() >= 0.2 * (1.0 - 1e-6)
+        # closure with the wrong sign in mode II counts as 0 in f
+        assert history["f[bond]"][history["event"] == "onset"].min() >= 1.0 - 1e-6
     else:
         mean = history["released_energy"][-1] / (lengths[-1] - lengths[0])
         assert mean == pytest.approx(0.2, rel=rtol)

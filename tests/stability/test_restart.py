@@ -325,6 +325,14 @@ def assert_same_history(whole: fx.History, found: fx.History) -> None:
         assert off <= (NOTHING if nothing else SAME) * largest[kind], (name, off, largest[kind])
 
 
+OTHER_RANKS = (
+    *("event, shear and contact", "3-D", "viscosity", "finite strain, event, turning load"),
+    *("finite strain, increments, friction", "plastic, short", "nonlinear path, progressive"),
+    *("inertia, finite strain", "pressure that follows, temperature"),
+)
+"""Runs that are restarted on another number of ranks."""
+
+
 @pytest.mark.parametrize(
     "name",
     [name if name in QUICK else pytest.param(name, marks=pytest.mark.slow) for name in RUNS],
@@ -332,8 +340,10 @@ def assert_same_history(whole: fx.History, found: fx.History) -> None:
 def test_restarted_anywhere_a_run_ends_the_same(
     name: str, comm: MPI.Intracomm, shared_path: Path
 ) -> None:
+    if comm.size > 1 and name not in QUICK and name in (*OTHER_RANKS, "plastic"):
+        pytest.skip("on several ranks these runs are restarted on another number of ranks")
     whole = run(name, comm)
-    for i, part in enumerate((0.3, 0.8)):
+    for i, part in enumerate((0.3, 0.8) if comm.size == 1 else (0.6,)):
         checkpoint = fx.Checkpoint(shared_path / f"{i}.npz", every=1)
         with pytest.raises(Stopped):
             run(name, comm, checkpoint, observers=[StopAt(round(part * len(whole)))])
@@ -344,23 +354,12 @@ def test_restarted_anywhere_a_run_ends_the_same(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "name",
-    [
-        "event, shear and contact",
-        "3-D",
-        "viscosity",
-        "finite strain, event, turning load",
-        "finite strain, increments, friction",
-        "plastic, short",
-        "nonlinear path, progressive",
-        "inertia, finite strain",
-        "pressure that follows, temperature",
-    ],
-)
+@pytest.mark.parametrize("name", OTHER_RANKS)
 def test_restart_on_another_number_of_ranks(
     name: str, comm: MPI.Intracomm, shared_path: Path
 ) -> None:
+    if comm.size == 1:
+        pytest.skip("there is no other number of ranks")
     whole = run(name, comm)
     stop = round(0.5 * len(whole))
     # one rank, then all of them

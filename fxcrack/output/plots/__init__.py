@@ -11,11 +11,13 @@ from fxcrack.output.plots.curves import (
     resistance,
 )
 from fxcrack.output.plots.deformed import deformed
+from fxcrack.output.plots.energies import energies
 from fxcrack.output.plots.fatigue import paris, tip_growth
 from fxcrack.output.plots.front_advance import front_advance
 
 __all__ = [
     "deformed",
+    "energies",
     "front_advance",
     "growth_rows",
     "load_curve",

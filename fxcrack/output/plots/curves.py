@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fxcrack.base.arrays import Array, Ints
@@ -126,7 +127,7 @@ def load_curve(history: History, x: Column | None = None, y: Column | None = Non
 
 def load_opening(
     history: History,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     x: Column | None = None,
     y: Column | None = None,
@@ -135,12 +136,13 @@ def load_opening(
     ylabel: str | None = None,
     label: str = "computed",
     title: str | None = None,
-) -> None:
+    ax: Axes | None = None,
+) -> Figure | None:
     """Plot load against opening; collective.
 
     Args:
         history: The history.
-        path: Picture file (.png, .pdf, .svg).
+        path: Picture file (.png, .pdf, .svg), or ``None`` for none.
         x: Column or array; see :func:`load_curve` for the default.
         y: Column or array.
         reference: Curves to compare with: (label, x, y) each.
@@ -148,6 +150,10 @@ def load_opening(
         ylabel: What y is and its unit.
         label: What the legend calls the computed curve.
         title: Heading.
+        ax: Axes to draw into, those of a new figure by default; needed on rank 0 only.
+
+    Returns:
+        The figure on rank 0, ``None`` on the others.
 
     Raises:
         InputError: The columns do not exist.
@@ -156,25 +162,25 @@ def load_opening(
     curve = load_curve(history, x, y)
 
     def draw() -> Figure:
-        figure, ax = new_figure()
+        figure, axes = new_figure(ax=ax)
         width = 2.0 if len(curve.x) <= 60 else 1.4  # every release is a drop of the load
-        ax.plot(curve.x, curve.y, color=COLOURS[0], linewidth=width, label=label, zorder=3)
+        axes.plot(curve.x, curve.y, color=COLOURS[0], linewidth=width, label=label, zorder=3)
         if curve.onset is not None:
             at = curve.x[curve.onset], curve.y[curve.onset]
             name = f"crack starts to grow ({at[0]:.4g}, {at[1]:.4g})"
-            ax.plot(
+            axes.plot(
                 *at, "o", markersize=7, color="white", markeredgecolor=COLOURS[0],
                 markeredgewidth=1.8, label=name, zorder=4,
             )  # fmt: skip
         for i, (name, rx, ry) in enumerate(reference or ()):
             style = ("--", "-.", ":")[i % 3]
-            ax.plot(rx, ry, style, color=COLOURS[1 + i % 4], linewidth=1.6, label=name, zorder=5)
-        dress(ax, xlabel=xlabel or curve.xlabel, ylabel=ylabel or curve.ylabel, title=title)
-        from_zero(ax)
-        legend(ax)
+            axes.plot(rx, ry, style, color=COLOURS[1 + i % 4], linewidth=1.6, label=name, zorder=5)
+        dress(axes, xlabel=xlabel or curve.xlabel, ylabel=ylabel or curve.ylabel, title=title)
+        from_zero(axes)
+        legend(axes)
         return figure
 
-    save(history.comm, path, draw)
+    return save(history.comm, path, draw)
 
 
 # -- R-curve ---------------------------------------------------------------------------------------
@@ -223,7 +229,7 @@ def resistance(history: History, interface: Interface | str) -> Resistance:
 
 def r_curve(
     history: History,
-    path: str | Path,
+    path: str | Path | None,
     interface: Interface | str,
     toughness: float | Callable[[Array], npt.ArrayLike] | None = None,
     *,
@@ -231,12 +237,13 @@ def r_curve(
     xlabel: str = "Crack length",
     ylabel: str | None = None,
     title: str | None = None,
-) -> None:
+    ax: Axes | None = None,
+) -> Figure | None:
     """Plot G (or f) at which the crack grew against its length; collective.
 
     Args:
         history: The history.
-        path: Picture file (.png, .pdf, .svg).
+        path: Picture file (.png, .pdf, .svg), or ``None`` for none.
         interface: Interface or its name.
         toughness: Critical G to compare with [force/length], a number or a function of crack length
             [length], shape (n,) -> (n,).
@@ -244,6 +251,10 @@ def r_curve(
         xlabel: What x is and its unit.
         ylabel: What y is and its unit.
         title: Heading.
+        ax: Axes to draw into, those of a new figure by default; needed on rank 0 only.
+
+    Returns:
+        The figure on rank 0, ``None`` on the others.
 
     Raises:
         InputError: The history knows no such interface, or not the quantity.
@@ -260,21 +271,21 @@ def r_curve(
     meaning = {"G": "Energy release rate at growth", "f": "Criterion f at growth"}
 
     def draw() -> Figure:
-        figure, ax = new_figure()
+        figure, axes = new_figure(ax=ax)
         some, many = data.onset, not data.onset.all()
 
         def curve(y: Array, label: str, colour: str, width: float) -> None:
             if many:
-                ax.plot(data.length, y, color=colour, linewidth=0.7, alpha=0.35, zorder=2)
+                axes.plot(data.length, y, color=colour, linewidth=0.7, alpha=0.35, zorder=2)
             marker = "o" if some.sum() <= 40 else ""
-            ax.plot(
+            axes.plot(
                 data.length[some], y[some], marker=marker, markersize=4.0, color=colour,
                 linewidth=width, label=label, zorder=3,
             )  # fmt: skip
 
         if quantity == "f":
             curve(data.f, "f", COLOURS[0], 2.0)
-            ax.axhline(1.0, color=INK, linewidth=1.2, linestyle="--", label="f = 1", zorder=4)
+            axes.axhline(1.0, color=INK, linewidth=1.2, linestyle="--", label="f = 1", zorder=4)
         else:
             total = data.rates.sum(axis=1)
             names = ["$G_\\mathrm{I}$", "$G_\\mathrm{II}$", "$G_\\mathrm{III}$"]
@@ -287,12 +298,12 @@ def r_curve(
             if toughness is not None:
                 x = data.length if len(data.length) else np.array([0.0, 1.0])
                 y = toughness(x) if callable(toughness) else np.full(len(x), float(toughness))
-                ax.plot(x, y, "--", color=COLOURS[1], linewidth=1.6, label="toughness", zorder=4)
+                axes.plot(x, y, "--", color=COLOURS[1], linewidth=1.6, label="toughness", zorder=4)
         if many:
-            ax.plot([], [], color=GREY, linewidth=0.7, label="growth running on at one load")
-        dress(ax, xlabel=xlabel, ylabel=ylabel or meaning[quantity], title=title)
-        ax.set_ylim(bottom=min(0.0, ax.dataLim.y0), top=1.12 * ax.dataLim.y1)
-        legend(ax, loc="best")
+            axes.plot([], [], color=GREY, linewidth=0.7, label="growth running on at one load")
+        dress(axes, xlabel=xlabel, ylabel=ylabel or meaning[quantity], title=title)
+        axes.set_ylim(bottom=min(0.0, axes.dataLim.y0), top=1.12 * axes.dataLim.y1)
+        legend(axes, loc="best")
         return figure
 
-    save(history.comm, path, draw)
+    return save(history.comm, path, draw)

@@ -176,24 +176,29 @@ def _upright(analysis: Analysis) -> tuple[Array, Array]:
 
 def deformed(
     source: Analysis | HasAnalysis,
-    path: str | Path,
+    path: str | Path | None = None,
     *,
     scale: float | None = None,
     component: str = "von_mises",
     label: str | None = None,
     title: str | None = None,
     view: tuple[float, float] = (35.0, 25.0),
-) -> None:
+    ax: Axes | None = None,
+) -> Figure | None:
     """Plot the deformed mesh coloured by a stress; collective, one back-solve.
 
     Args:
         source: A scene or its analysis, after a step.
-        path: Picture file (.png, .pdf, .svg).
+        path: Picture file (.png, .pdf, .svg), or ``None`` for none.
         scale: Factor on displacements; chosen by itself if ``None`` and named in the picture.
         component: "von_mises" or a component of the stress, e.g. "xx".
         label: What the colours mean and their unit.
         title: Heading, before the scale.
         view: Azimuth and elevation of the viewer in degrees (3-D).
+        ax: Axes to draw into, those of a new figure by default; needed on rank 0 only.
+
+    Returns:
+        The figure on rank 0, ``None`` on the others.
 
     Raises:
         InputError: The component is unknown, or no step was run yet.
@@ -221,34 +226,34 @@ def deformed(
         low_and_wide = size[1] < 0.25 * size[0]
         height = (8.3 if low_and_wide else 7.4) * size[1] / size[0]
         height += (1.7 if low_and_wide else 1.0) - (0.0 if flat else 0.25)
-        figure, ax = new_figure(9.0, float(np.clip(height, 2.2, 8.0)))
+        figure, drawn = new_figure(9.0, float(np.clip(height, 2.2, 8.0)), ax=ax)
         width = float(np.clip(60.0 / np.sqrt(len(points)), 0.0, 0.4))
         edges = "face" if width < 0.15 else (0.1, 0.12, 0.16, 0.35)
         faces = PolyCollection(list(points), facecolors=colours, linewidths=width, edgecolors=edges)
-        ax.add_collection(faces)
+        drawn.add_collection(faces)
         heading = f"{title}   " if title else ""
         heading += f"displacements {TIMES} {factor:g}"
-        dress(ax, xlabel="x", ylabel="y", title=heading)
-        ax.grid(False)
+        dress(drawn, xlabel="x", ylabel="y", title=heading)
+        drawn.grid(False)
         if flat:
-            ax.add_collection(
+            drawn.add_collection(
                 LineCollection(
                     list(border), colors=GREY, linewidths=0.7, linestyles="--", zorder=0.5
                 )
             )
         else:
-            ax.set_axis_off()
-        ax.set_aspect("equal")
+            drawn.set_axis_off()
+        drawn.set_aspect("equal")
         low, high = every.min(axis=0), every.max(axis=0)
-        ax.set_xlim(low[0] - 0.02 * size[0], high[0] + 0.02 * size[0])
-        ax.set_ylim(low[1] - 0.04 * size[1], high[1] + 0.04 * size[1])
+        drawn.set_xlim(low[0] - 0.02 * size[0], high[0] + 0.02 * size[0])
+        drawn.set_ylim(low[1] - 0.04 * size[1], high[1] + 0.04 * size[1])
         if not flat:
-            _triad(ax, axes)
+            _triad(drawn, axes)
         words = "von Mises stress" if component == "von_mises" else f"Stress {component}"
-        colour_bar(figure, ax, mapping, label or words, below=low_and_wide, extend=extend)
+        colour_bar(figure, drawn, mapping, label or words, below=low_and_wide, extend=extend)
         return figure
 
-    save(analysis.comm, path, draw)
+    return save(analysis.comm, path, draw)
 
 
 def _colours(values: Array, *, signed: bool) -> tuple[Normalize, str, str]:

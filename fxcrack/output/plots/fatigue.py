@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fxcrack.base.arrays import Array, Ints
@@ -59,24 +60,29 @@ def tip_growth(history: History, interface: Interface | str) -> TipGrowth:
 
 def paris(
     history: History,
-    path: str | Path,
+    path: str | Path | None,
     interface: Interface | str,
     *,
     show: Literal["rate", "length"] = "rate",
     xlabel: str | None = None,
     ylabel: str | None = None,
     title: str | None = None,
-) -> None:
+    ax: Axes | None = None,
+) -> Figure | None:
     """Plot da/dN against dG, or the crack length against cycles, of all tips; collective.
 
     Args:
         history: The history.
-        path: Picture file (.png, .pdf, .svg).
+        path: Picture file (.png, .pdf, .svg), or ``None`` for none.
         interface: Interface or its name.
         show: "rate", both axes logarithmic; or "length".
         xlabel: What x is and its unit.
         ylabel: What y is and its unit.
         title: Heading.
+        ax: Axes to draw into, those of a new figure by default; needed on rank 0 only.
+
+    Returns:
+        The figure on rank 0, ``None`` on the others.
 
     Raises:
         InputError: ``show`` is unknown, or the history has no cycles of the interface.
@@ -87,22 +93,22 @@ def paris(
     data = tip_growth(history, interface)
 
     def draw() -> Figure:
-        figure, ax = new_figure()
+        figure, axes = new_figure(ax=ax)
         if show == "rate":
             on = (data.dG > 0.0) & (data.dadN > 0.0)
-            ax.plot(data.dG[on], data.dadN[on], "o", markersize=4.0, color=COLOURS[0])
+            axes.plot(data.dG[on], data.dadN[on], "o", markersize=4.0, color=COLOURS[0])
             dress(
-                ax,
+                axes,
                 xlabel=xlabel or "Range of the energy release rate $\\Delta G$",
                 ylabel=ylabel or "Growth per cycle d$a$/d$N$",
                 title=title,
             )
             if on.any():
-                ax.set(xscale="log", yscale="log")
+                axes.set(xscale="log", yscale="log")
             return figure
-        ax.plot(data.N, data.a, "o-", markersize=4.0, color=COLOURS[0], linewidth=1.6)
-        dress(ax, xlabel=xlabel or "Cycles $N$", ylabel=ylabel or "Crack length", title=title)
-        legend(ax)
+        axes.plot(data.N, data.a, "o-", markersize=4.0, color=COLOURS[0], linewidth=1.6)
+        dress(axes, xlabel=xlabel or "Cycles $N$", ylabel=ylabel or "Crack length", title=title)
+        legend(axes)
         return figure
 
-    save(history.comm, path, draw)
+    return save(history.comm, path, draw)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -119,7 +120,7 @@ def _around(data: ReleaseMap) -> tuple[Array, Array]:
 
 def front_advance(
     source: Analysis | HasAnalysis,
-    path: str | Path,
+    path: str | Path | None,
     interface: Interface | str,
     *,
     released: Sequence[tuple[int, float]] | None = None,
@@ -127,18 +128,23 @@ def front_advance(
     n_lines: int = 8,
     label: str | None = None,
     title: str | None = None,
-) -> None:
+    ax: Axes | None = None,
+) -> Figure | None:
     """Plot an interface from above, coloured by when it opened, with fronts in between; collective.
 
     Args:
         source: A scene in three dimensions, or its analysis.
-        path: Picture file (.png, .pdf, .svg).
+        path: Picture file (.png, .pdf, .svg), or ``None`` for none.
         interface: Interface or its name.
         released: Slave node and time of each release, in order; those of the scene by default.
         colour: "order" of release or "time" of release.
         n_lines: How many positions of the front are drawn.
         label: What the colours mean.
         title: Heading.
+        ax: Axes to draw into, those of a new figure by default; needed on rank 0 only.
+
+    Returns:
+        The figure on rank 0, ``None`` on the others.
 
     Raises:
         InputError: The interface is unknown or a line, or ``colour`` is another word.
@@ -152,31 +158,31 @@ def front_advance(
         low, high = _around(data)
         size = high - low
         height = float(np.clip(6.3 * size[1] / size[0] + 1.5, 2.4, 7.5))
-        figure, ax = new_figure(8.0, height)
+        figure, axes = new_figure(8.0, height, ax=ax)
         opened, corners = data.opened(), data.points[data.triangles]
         for part, plain in ((opened == 0.0, _INITIAL), (np.isinf(opened), LIGHT)):
-            ax.add_collection(PolyCollection(list(corners[part]), facecolors=plain, **_SEAMLESS))
+            axes.add_collection(PolyCollection(list(corners[part]), facecolors=plain, **_SEAMLESS))
         grown = np.isfinite(opened) & (opened > 0.0)
         if np.any(grown):
             step = opened[grown]
             value = step if colour == "order" else data.times[step.astype(int)]
             paint = PolyCollection(list(corners[grown]), array=value, cmap="viridis", **_SEAMLESS)
-            ax.add_collection(paint)
+            axes.add_collection(paint)
             words = {"order": "Order of release", "time": "Time of release"}
-            colour_bar(figure, ax, paint, label or words[colour])
+            colour_bar(figure, axes, paint, label or words[colour])
         total = len(data.times) - 1
         grid = Triangulation(data.points[:, 0], data.points[:, 1], data.triangles)
         for stage in np.unique(np.linspace(0, total, n_lines).astype(int)):
             # just behind the bonded nodes
-            ax.tricontour(
+            axes.tricontour(
                 grid, (data.order <= stage).astype(float), levels=[1e-6], colors=[INK],
                 linewidths=[1.8 if stage in (0, total) else 0.8],
             )  # fmt: skip
-        dress(ax, xlabel=data.axes[0], ylabel=data.axes[1], title=title)
-        ax.grid(False)
-        ax.set_aspect("equal")
-        ax.set_xlim(low[0], high[0])
-        ax.set_ylim(low[1], high[1])
+        dress(axes, xlabel=data.axes[0], ylabel=data.axes[1], title=title)
+        axes.grid(False)
+        axes.set_aspect("equal")
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
         handles = [
             Patch(facecolor=_INITIAL, label="initial crack"),
             Patch(facecolor=LIGHT, edgecolor=GREY, linewidth=0.5, label="bonded"),
@@ -188,4 +194,4 @@ def front_advance(
         )  # fmt: skip
         return figure
 
-    save(analysis_of(source).comm, path, draw)
+    return save(analysis_of(source).comm, path, draw)

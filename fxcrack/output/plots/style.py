@@ -23,8 +23,15 @@ LIGHT = "#e6e9ee"
 COLOURS = ("#1b5e9e", "#d8611a", "#2a8f6a", "#7a4fa3", "#b8336a")
 
 
-def new_figure(width: float = 6.4, height: float = 4.2) -> tuple[Figure, Axes]:
-    """A figure of a size in inches with one pair of axes."""
+def new_figure(
+    width: float = 6.4, height: float = 4.2, ax: Axes | None = None
+) -> tuple[Figure, Axes]:
+    """A figure of a size in inches with one pair of axes, or the axes given and their figure."""
+    if ax is not None:
+        figure = ax.figure
+        while not isinstance(figure, Figure):  # axes of a subfigure
+            figure = figure.figure
+        return figure, ax
     figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
     return figure, figure.add_subplot()
 
@@ -77,19 +84,25 @@ def from_zero(ax: Axes) -> None:
         ax.set_ylim(bottom=0.0)
 
 
-def save(comm: MPI.Comm, path: str | Path, draw: Callable[[], Figure]) -> None:
+def save(comm: MPI.Comm, path: str | Path | None, draw: Callable[[], Figure]) -> Figure | None:
     """Draw on rank 0 and write the file whole; collective.
 
     Args:
         comm: Communicator on which all ranks call.
-        path: Picture file; its ending (.png, .pdf, .svg) names the format.
+        path: Picture file; its ending (.png, .pdf, .svg) names the format. ``None`` writes none.
         draw: Makes the figure; called on rank 0 only.
+
+    Returns:
+        The figure on rank 0, ``None`` on the others.
 
     Raises:
         FxcrackError: Drawing or writing failed; an older file is still there.
     """
-    with all_or_none(comm, f"plotting '{path}'"):
+    figure = None
+    with all_or_none(comm, "plotting" if path is None else f"plotting '{path}'"):
         if comm.rank == 0:
             figure = draw()
-            with replacing(path) as temporary:
-                figure.savefig(temporary, dpi=DPI)
+            if path is not None:
+                with replacing(path) as temporary:
+                    figure.savefig(temporary, dpi=DPI)
+    return figure

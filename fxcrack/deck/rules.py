@@ -1,9 +1,11 @@
-"""What a deck of dynamics must be like, looked at before the scene is made of it."""
+"""What decks of dynamics and of shells must be like, looked at before a scene is made of them."""
 
 from __future__ import annotations
 
-from fxcrack.continuum.continuum_shell import ContinuumShell
-from fxcrack.continuum.materials import Plastic
+from collections.abc import Sequence
+
+from fxcrack.continuum.materials import Material, Plastic
+from fxcrack.continuum.section import Section
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.loads import Loads
 from fxcrack.deck.model import Model
@@ -13,6 +15,37 @@ from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
 
 
+def density_of(material: Material | Section) -> float | None:
+    """Density of a material or the mean one of a section, mass/volume; ``None`` without."""
+    found = material.laminate if isinstance(material, Section) else material
+    density: float | None = getattr(found, "density", None)
+    return density
+
+
+def check_shells(procedures: Sequence[Procedure], loads: Loads, temperatures: Temperatures) -> None:
+    """Refuse what shells on surfaces do not have.
+
+    Raises:
+        DeckError: Says which, and what to do instead.
+    """
+    for procedure in procedures:
+        if procedure.inertia is not None:
+            procedure.card.fail(
+                "shells on surfaces have no inertia here; take continuum shells (SC8R), solids, or "
+                "*STATIC"
+            )
+    if temperatures.first is not None:
+        temperatures.first.fail(
+            "shells on surfaces have no temperature here; take continuum shells (SC8R) or solids"
+        )
+    entry = loads.following
+    if entry is not None:
+        entry.row.fail(
+            "a pressure on a shell keeps its direction here, but follows the shell where NLGEOM is "
+            "on; add FOLLOWER=NO to let it keep its direction, or write NLGEOM=NO"
+        )
+
+
 def check_density(procedure: Procedure, sections: Sections, model: Model) -> None:
     """Refuse bodies without a density in a dynamic step.
 
@@ -20,7 +53,7 @@ def check_density(procedure: Procedure, sections: Sections, model: Model) -> Non
         DeckError: Says which material has none.
     """
     for name, material in sections.materials.items():
-        if getattr(material, "density", None) is None:
+        if density_of(material) is None:
             procedure.card.fail(
                 f"the material of '{name}' has no *DENSITY, which moving bodies must have; add it"
             )
@@ -48,12 +81,6 @@ def check_explicit(
         DeckError: Says which, and what to do instead.
     """
     card = procedure.card
-    if any(isinstance(m, ContinuumShell) for m in sections.materials.values()):
-        card.fail(
-            "continuum shells are elements of the second order here, and explicit dynamics needs "
-            "the first; mesh the part with solids (C3D8 and *SOLID SECTION), or take implicit "
-            "*DYNAMIC"
-        )
     if flat.kind.order != 1:
         card.fail(
             f"{flat.given_kind.name} elements of the second order are not possible in explicit "

@@ -1,0 +1,216 @@
+"""Virtual extension of a crack: how far the points around a tip move when the crack grows there.
+
+The extension q of a tip has the size 1 at the tip and falls to zero at the outer radius, along the
+front from 1 at the tip to 0 at its neighbours. It is a function of the position, so that it is the
+same on both sides of the bonded faces, interpolated between the corners of the cells. Nowhere does
+it move the boundary of a body, or that between two materials, out of its place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.criteria.front_cells import FrontCells
+from fxcrack.interface.front import Front
+from fxcrack.interface.tips import Tips
+
+_ALONG = 0.5
+"""Cosine between the front and an edge that is part of it, at least."""
+_ONE_FACE = 0.75
+"""Cosine between the normals of two facets of one smooth face, at least; at edges it is less."""
+_NOTHING = 1e-6
+"""Extensions below this are zero."""
+
+
+@dataclass(frozen=True)
+class FrontLine:
+    """The front as segments between its corner nodes; in 2-D single points.
+
+    Attributes:
+        x: Positions of the tips, shape (n_tips, 3) [length].
+        segments: Tips at both ends of each segment, twice the same for a point, shape
+            (n_segments, 2).
+        members: Corner tips that stand for each tip: itself, or those beside a midside node.
+    """
+
+    x: Array
+    segments: Ints
+    members: list[Ints]
+
+    @classmethod
+    def of(cls, front: Front, tips: Tips) -> FrontLine:
+        """The line of a present front.
+
+        Args:
+            front: The front.
+            tips: Its nodes.
+        """
+        surface = front.surface
+        x = surface.x[tips.node]
+        corners = np.isin(tips.node, surface.facets[:, : surface.n_corners])
+        at = {int(node): i for i, node in enumerate(tips.node)}
+        segments: list[tuple[int, int]] = []
+        if surface.dim == 2:
+            for i in np.flatnonzero(corners).tolist():
+                segments += [(min(i, j), max(i, j)) for j in _neighbours(front, tips, at, i)]
+        found = np.array(sorted(set(segments)), dtype=np.int64).reshape(-1, 2)
+        alone = np.setdiff1d(np.flatnonzero(corners), found.ravel())
+        found = np.concatenate([found, np.stack([alone, alone], axis=1)])
+        members = []
+        for tip in range(len(tips)):
+            if corners[tip]:
+                members.append(np.array([tip]))
+                continue
+            away = np.linalg.norm(x[corners] - x[tip], axis=1)
+            near = np.flatnonzero(corners)[np.argsort(away, kind="stable")[:2]]
+            members.append(np.sort(near))
+        return cls(x, found, members)
+
+    def widths(self, tips: Tips, i: int) -> float:
+        """Area that the extension of a tip opens per length, in the direction it grows [length].
+
+        In 2-D 1: what is out of the plane is not counted.
+        """
+        total = 0.0
+        normal, growth = tips.frame[i, :, 0], tips.frame[i, :, 1]
+        for member in self.members[i]:
+            for a, b in self.segments[(self.segments == member).any(axis=1)]:
+                if a == b:
+                    total += 1.0
+                else:
+                    chord = self.x[b] - self.x[a]
+                    total += 0.5 * abs(float(np.cross(normal, chord) @ growth))
+        return total
+
+    def nearest(self, x: Array) -> tuple[Array, Ints, Array]:
+        """The nearest point of the front.
+
+        Args:
+            x: Positions, shape (n, 3) [length].
+
+        Returns:
+            Distances, shape (n,) [length]; the two tips around the nearest points, shape (n, 2);
+            the share of each, likewise.
+        """
+        a, b = self.x[self.segments[:, 0]], self.x[self.segments[:, 1]]
+        chord = b - a
+        square = np.einsum("sc,sc->s", chord, chord)
+        away = x[:, None] - a[None]
+        share = np.einsum("nsc,sc->ns", away, chord) / np.where(square > 0.0, square, 1.0)
+        share = np.clip(share, 0.0, 1.0)
+        distance = np.linalg.norm(away - share[..., None] * chord[None], axis=2)
+        # of equal ones the first: which of them it is makes no difference to the shares
+        best = np.argmin(distance, axis=1)
+        row = np.arange(len(x))
+        last = share[row, best]
+        return distance[row, best], self.segments[best], np.stack([1.0 - last, last], axis=1)
+
+
+def _neighbours(front: Front, tips: Tips, at: dict[int, int], i: int) -> list[int]:
+    """Tips beside a corner tip along the front, at most one on each side."""
+    x = front.surface.x
+    node = int(tips.node[i])
+    best: dict[bool, tuple[float, int]] = {}
+    for end, middle in front.links[node]:
+        j = at.get(int(end))
+        if j is None or (middle >= 0 and not front.bonded[middle]):
+            continue
+        edge = x[end] - x[node]
+        cosine = float(edge @ tips.frame[i, :, 2]) / float(np.linalg.norm(edge))
+        other = float(edge @ tips.frame[j, :, 2]) / float(np.linalg.norm(edge))
+        if min(abs(cosine), abs(other)) < _ALONG:
+            continue
+        side = cosine > 0.0
+        if side not in best or abs(cosine) > best[side][0] * (1.0 + 1e-9):
+            best[side] = abs(cosine), j
+    return [j for _, j in best.values()]
+
+
+class Corners:
+    """Corners of cells around a front and how they may move.
+
+    Args:
+        cells: The cells.
+        line: The front.
+    """
+
+    def __init__(self, cells: FrontCells, line: FrontLine) -> None:
+        ids = cells.nodes[:, : cells.n_corners]
+        unique, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
+        self._gdim = cells.corners.shape[2]
+        self.of_cell = inverse.reshape(ids.shape)
+        self.node = unique
+        self.x = np.zeros((len(unique), 3))
+        self.x[:, : self._gdim] = cells.corners.reshape(-1, self._gdim)[first]
+        self.distance, self._tips, self._shares = line.nearest(self.x)
+        self._line = line
+        self._fixed = self._directions(cells)
+
+    def _directions(self, cells: FrontCells) -> dict[int, Array]:
+        """Orthonormal directions in which some corners must not move, shape (m, gdim) each."""
+        local = cells.facet_corners
+        ids = self.of_cell[:, local]
+        flat = np.sort(ids.reshape(-1, local.shape[1]), axis=1)
+        part = np.repeat(cells.part, len(local))
+        between = np.zeros(len(flat), dtype=bool)
+        if len(np.unique(cells.part)) > 1:
+            _, group = np.unique(flat, axis=0, return_inverse=True)
+            group = group.ravel()
+            low = np.full(group.max() + 1, np.iinfo(np.int64).max)
+            high = np.full(group.max() + 1, -1)
+            np.minimum.at(low, group, part)
+            np.maximum.at(high, group, part)
+            between = (low != high)[group]
+        chosen = np.flatnonzero(cells.outer.ravel() | between)
+        x = self.x[ids.reshape(-1, local.shape[1])[chosen]]
+        if self._gdim == 2:
+            normals = np.cross(x[:, 1] - x[:, 0], [0.0, 0.0, 1.0])
+        else:
+            normals = np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0])
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        groups: dict[int, list[Array]] = {}
+        for corners, normal in zip(ids.reshape(-1, local.shape[1])[chosen], normals, strict=True):
+            for corner in corners.tolist():
+                _add(groups.setdefault(corner, []), normal[: self._gdim])
+        return {corner: _orthonormal(found) for corner, found in groups.items()}
+
+    def extension(self, tips: Tips, i: int, radius: float, core: float) -> Array:
+        """Extension of a tip at the corners, shape (n_corners, gdim).
+
+        Args:
+            tips: Front nodes.
+            i: Which of them.
+            radius: Where it has fallen to zero [length].
+            core: Where it begins to fall [length].
+        """
+        inside = np.isin(self._tips, self._line.members[i])
+        same = self._tips[:, 0] == self._tips[:, 1]
+        share = np.where(same, inside[:, 0], (self._shares * inside).sum(axis=1))
+        fall = np.clip((radius - self.distance) / (radius - core), 0.0, 1.0)
+        size = share * fall
+        size[size < _NOTHING] = 0.0
+        q = size[:, None] * tips.frame[i, : self._gdim, 1]
+        for corner in np.flatnonzero(size):
+            fixed = self._fixed.get(int(corner))
+            if fixed is not None:
+                q[corner] -= (fixed @ q[corner]) @ fixed
+        return q
+
+
+def _add(groups: list[Array], normal: Array) -> None:
+    """Add a facet's normal to those of its face, or as a face of its own."""
+    for k, total in enumerate(groups):
+        cosine = float(total @ normal) / float(np.linalg.norm(total))
+        if abs(cosine) > _ONE_FACE:
+            groups[k] = total + np.sign(cosine) * normal
+            return
+    groups.append(normal)
+
+
+def _orthonormal(vectors: list[Array]) -> Array:
+    """An orthonormal basis of what some vectors span, shape (m, gdim)."""
+    _, size, basis = np.linalg.svd(np.array(vectors), full_matrices=False)
+    return np.asarray(basis[size > 0.3 * size[0]])
