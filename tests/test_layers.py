@@ -42,7 +42,7 @@ ON_USE = {
 """Imports inside functions, or beginnings of such arrows, with the reason."""
 
 LEVELS = 2
-"""Classes of this package above a class; exceptions may have more, as handlers read them."""
+"""Classes of this package above a class."""
 
 
 @pytest.fixture(scope="module")
@@ -104,14 +104,10 @@ def test_inheritance_is_flat(modules: dict[str, ast.Module]) -> None:
     }
 
     def levels(name: str) -> int:
-        # a protocol says what a class offers and hands nothing down that must be followed
-        above = [b for b in bases[name] if b in bases and "Protocol" not in bases[b]]
+        above = [b for b in bases[name] if b in bases]
         return max((1 + levels(b) for b in above), default=0)
 
-    def is_error(name: str) -> bool:
-        return name == "FxcrackError" or any(is_error(b) for b in bases.get(name, []))
-
-    deep = sorted(name for name in bases if levels(name) > LEVELS and not is_error(name))
+    deep = sorted(name for name in bases if levels(name) > LEVELS)
     assert deep == []
 
 

@@ -36,8 +36,16 @@ class ConvergenceError(SolverError):
     """An iteration ended without meeting its tolerance."""
 
 
-class ComesApart(ConvergenceError):
+class ComesApart(SolverError):
     """Total separation: the load exceeds what the remaining interface carries."""
+
+
+class EnergyImbalance(SolverError):
+    """Work and energies of an increment do not balance: it is too large."""
+
+
+NO_EQUILIBRIUM = (ConvergenceError, ComesApart, EnergyImbalance)
+"""What is raised where there is no equilibrium at the end of an increment, or none is found."""
 
 
 class EnergyError(FxcrackError, RuntimeError):

@@ -11,19 +11,15 @@ so they are linear between two equilibria of the same states.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.criteria.evaluator import Evaluator
 from fxcrack.criteria.probe import FrontProbe
 from fxcrack.interface.surface_paths import SurfacePath, SurfacePaths, locate
 from fxcrack.interface.tips import Tips
-
-_ROUND_OFF = 1e-11
-"""Tractions below this fraction of the largest one count as zero."""
 
 
 @dataclass(frozen=True)
@@ -58,30 +54,35 @@ class Stencil:
         return np.asarray(np.einsum("nk,nk...->n...", self.weights, values))
 
 
-class _AtDistance(Evaluator):
-    """What both criteria share: ways along the surface and stencils kept for the present front.
+class TipStencils:
+    """Stencils of the tips of one interface, kept for the present front.
 
     Args:
         probe: The interface, with its front in the initial state.
-        distance: From the tip, length.
-        temperature: Temperature of the slave nodes, shape (n_nodes,); None without.
+        part: Slave nodes and weights at a tip, given all tips and its number among them, both of
+            shape (order + 1,) or (1,).
+
+    Attributes:
+        front: The front.
+        surface: The slave surface.
+        paths: Paths along it.
     """
 
-    degree: ClassVar[float] = 1.0
-
-    def __init__(self, probe: FrontProbe, distance: float, temperature: Array | None) -> None:
-        self.probe = probe
-        self.distance = distance
-        self.temperature = temperature
+    def __init__(self, probe: FrontProbe, part: Callable[[Tips, int], tuple[Ints, Array]]) -> None:
         self.front = probe.front
         self.surface = self.front.surface
         self.paths = SurfacePaths(self.front)
+        self._probe, self._part = probe, part
         self._known: dict[tuple[int, int, bytes], Stencil] = {}
 
     def _key(self, tips: Tips) -> tuple[int, int, bytes]:
         return self.front.version, self.front.placed, tips.node.tobytes()
 
-    def stencil(self, tips: Tips) -> Stencil:
+    def is_known(self, tips: Tips) -> bool:
+        """Whether the stencil of the tips is that of the present front already."""
+        return self._key(tips) in self._known
+
+    def at(self, tips: Tips) -> Stencil:
         """Stencil of the tips, found anew when the front or the bodies have moved."""
         key = self._key(tips)
         if key not in self._known:
@@ -89,29 +90,20 @@ class _AtDistance(Evaluator):
             self._known = {key: Stencil.of(parts, self.surface.order)}
         return self._known[key]
 
-    def temperature_at(self, tips: Tips) -> Array | None:
-        """Temperature of the tips, shape (n,); None without."""
-        return None if self.temperature is None else self.temperature[tips.node]
-
-    def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
-        """Slave nodes and weights at one tip; each evaluator has its own."""
-        raise NotImplementedError
-
-    def _check_start(self) -> None:
-        """Find the stencils of the initial tips, which raises InputError for a wrong distance."""
-        tips = self.front.tips()
-        if len(tips):
-            self.stencil(tips)
-
     def where(self, node: int) -> str:
         """Interface and tip in words."""
-        x = self.surface.x[node, : self.probe.gdim]
+        x = self.surface.x[node, : self._probe.gdim]
         x = np.where(np.abs(x) < 1e-9 * self.paths.longest, 0.0, x)
         place = ", ".join(f"{c:.6g}" for c in x)
-        return f"interface '{self.probe.pair.title}', tip at ({place})"
+        return f"interface '{self._probe.pair.title}', tip at ({place})"
 
 
-def _on_face(path: SurfacePath, points: Array, distance: float, order: int) -> tuple[Ints, Array]:
+def at_nodes(values: Array | None, nodes: Ints) -> Array | None:
+    """Values of slave nodes, shape (n_nodes,), at some of them, shape (n,); None without."""
+    return None if values is None else values[nodes]
+
+
+def on_face(path: SurfacePath, points: Array, distance: float, order: int) -> tuple[Ints, Array]:
     """Nodes and weights of the point on a path at a distance from its beginning."""
     rows, weights = locate("path", points, distance, order)
     return path.nodes[rows], weights

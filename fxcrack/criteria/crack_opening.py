@@ -19,8 +19,9 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import flag, keep, list_of, not_negative, positive, table
 from fxcrack.base.errors import InputError
-from fxcrack.criteria.at_distance import Stencil, _AtDistance, _on_face
+from fxcrack.criteria.at_distance import Stencil, TipStencils, at_nodes, on_face
 from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.evaluator import Evaluator
 from fxcrack.criteria.interface_temperature import InterfaceTemperature, steady
 from fxcrack.criteria.probe import FrontProbe, State
 from fxcrack.criteria.release_laws import Driver
@@ -137,7 +138,7 @@ class CrackOpening(Criterion):
         return np.asarray(np.maximum(opening, 0.0) / critical)
 
 
-class OpeningEvaluator(_AtDistance):
+class OpeningEvaluator(Evaluator):
     """Critical opening at a straight-line distance behind the tip.
 
     The critical value belongs to the length grown from the initial tip along the slave surface.
@@ -152,55 +153,60 @@ class OpeningEvaluator(_AtDistance):
             depends on temperature and there is none.
     """
 
+    degree: ClassVar[float] = 1.0
+
     def __init__(
         self,
         probe: FrontProbe,
         criterion: CrackOpening,
         temperature: Array | None = None,
     ) -> None:
-        super().__init__(probe, criterion.distance, temperature)
-        self.criterion = criterion
+        self.probe, self.criterion, self.temperature = probe, criterion, temperature
+        self.stencils = TipStencils(probe, self._part)
         criterion.critical_at(0.0, temperature)
-        self.behind = criterion.distance + self.paths.longest
-        self._grown = np.zeros(self.surface.n_nodes)
+        self.behind = criterion.distance + self.stencils.paths.longest
+        self._grown = np.zeros(self.stencils.surface.n_nodes)
         self._warned = False
-        self._check_start()
+        tips = probe.front.tips()
+        if len(tips):
+            self._stencil(tips)  # a wrong distance shows here
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
         paired = self.probe.pair.paired
-        way = self.paths.behind(tips, i, self.distance * (1.0 - 1e-12), paired)
+        distance, stencils = self.criterion.distance, self.stencils
+        way = stencils.paths.behind(tips, i, distance * (1.0 - 1e-12), paired)
         reach = float(way.radius.max())
-        if self.distance > reach * (1.0 + 1e-12):
+        if distance > reach * (1.0 + 1e-12):
             raise InputError(
-                f"{self.where(int(tips.node[i]))}: CrackOpening distance {self.distance:g} lies "
+                f"{stencils.where(int(tips.node[i]))}: CrackOpening distance {distance:g} lies "
                 f"outside the end points of the pair, {reach:g} behind the tip; give a smaller "
                 "distance, or extend both surfaces"
             )
-        nodes, weights = _on_face(way, way.x, min(self.distance, reach), self.surface.order)
-        bonded = self.front.bonded[nodes] & (nodes != tips.node[i])
+        nodes, weights = on_face(way, way.x, min(distance, reach), stencils.surface.order)
+        bonded = stencils.front.bonded[nodes] & (nodes != tips.node[i])
         if bonded[np.abs(weights) > 1e-9].any() and not self._warned:
             self._warned = True
             log.warn(
                 "%s: CrackOpening distance %g reaches back to bonded nodes behind the crack, "
                 "which do not open; give a smaller distance",
-                self.where(int(tips.node[i])),
-                self.distance,
+                stencils.where(int(tips.node[i])),
+                distance,
             )
         return nodes, weights
 
-    def stencil(self, tips: Tips) -> Stencil:
+    def _stencil(self, tips: Tips) -> Stencil:
         """Stencil of the tips; the lengths they have grown are found with it."""
-        if self._key(tips) not in self._known:
-            self._grown[tips.node] = self.paths.origins(tips).grown
-        return super().stencil(tips)
+        if not self.stencils.is_known(tips):
+            self._grown[tips.node] = self.stencils.paths.origins(tips).grown
+        return self.stencils.at(tips)
 
     def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Opening, and length grown so far, shape (n, 2), length."""
-        stencil = self.stencil(tips)
+        stencil = self._stencil(tips)
         pair = self.probe.pair
         jump = self.probe.jumps(stencil.nodes, state)
         normal = np.zeros((*stencil.nodes.shape, 3))
-        if self.front.placed:  # the arms turn to both sides of the normal at the tip
+        if self.stencils.front.placed:  # the arms turn to both sides of the normal at the tip
             normal[:] = tips.frame[:, None, :, 0]
         else:
             normal[..., : self.probe.gdim] = pair.frames[stencil.nodes, :, 0]
@@ -218,10 +224,10 @@ class OpeningEvaluator(_AtDistance):
             f, shape (n,), and "cod" and "grown", each of shape (n,) [length].
         """
         opening, grown = measured.T
-        f = self.criterion.value(opening, grown, self.temperature_at(tips))
+        f = self.criterion.value(opening, grown, at_nodes(self.temperature, tips.node))
         return f, {"cod": opening, "grown": grown}
 
     def needs(self, tips: Tips) -> Ints:
         """The open slave nodes whose openings are used, shape (m,)."""
-        nodes = self.stencil(tips).nodes.ravel()
-        return np.asarray(nodes[~self.front.bonded[nodes]])
+        nodes = self._stencil(tips).nodes.ravel()
+        return np.asarray(nodes[~self.stencils.front.bonded[nodes]])

@@ -17,13 +17,17 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import not_negative, number, positive
 from fxcrack.base.errors import InputError
-from fxcrack.criteria.at_distance import _ROUND_OFF, _AtDistance, _on_face
+from fxcrack.criteria.at_distance import TipStencils, at_nodes, on_face
 from fxcrack.criteria.criterion import Criterion
+from fxcrack.criteria.evaluator import Evaluator
 from fxcrack.criteria.interface_temperature import InterfaceTemperature, steady
 from fxcrack.criteria.probe import FrontProbe, State
 from fxcrack.criteria.release_laws import Driver
 from fxcrack.criteria.toughness import Tabulated
 from fxcrack.interface.tips import Tips
+
+_ROUND_OFF = 1e-11
+"""Tractions below this fraction of the largest one count as zero."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +118,7 @@ class CriticalStress(Criterion):
         return np.asarray(np.hypot(np.hypot(relative[..., 0], relative[..., 1]), relative[..., 2]))
 
 
-class StressEvaluator(_AtDistance):
+class StressEvaluator(Evaluator):
     """Critical stress at a distance ahead of the tip, measured along the slave surface.
 
     Where fewer bonded nodes than that lie ahead (the end of the surface or another crack is
@@ -130,41 +134,46 @@ class StressEvaluator(_AtDistance):
             (a warning on a surface), or a strength depends on temperature and there is none.
     """
 
+    degree: ClassVar[float] = 1.0
+
     def __init__(
         self,
         probe: FrontProbe,
         criterion: CriticalStress,
         temperature: Array | None = None,
     ) -> None:
-        super().__init__(probe, criterion.distance, temperature)
-        self.criterion = criterion
+        self.probe, self.criterion, self.temperature = probe, criterion, temperature
+        self.stencils = TipStencils(probe, self._part)
         criterion.strength(temperature)
-        self.ahead = criterion.distance + self.paths.longest
+        self.ahead = criterion.distance + self.stencils.paths.longest
         self._starting = True
-        self._check_start()
+        tips = probe.front.tips()
+        if len(tips):
+            self.stencils.at(tips)  # a wrong distance shows here
         self._starting = False
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
-        way = self.paths.ahead(tips, i, self.distance * (1.0 - 1e-12))
+        distance, stencils = self.criterion.distance, self.stencils
+        way = stencils.paths.ahead(tips, i, distance * (1.0 - 1e-12))
         reach = float(way.s[-1])
-        if self.distance > reach * (1.0 + 1e-12) and self._starting:
+        if distance > reach * (1.0 + 1e-12) and self._starting:
             problem = (
-                f"{self.where(int(tips.node[i]))}: CriticalStress distance {self.distance:g} lies "
+                f"{stencils.where(int(tips.node[i]))}: CriticalStress distance {distance:g} lies "
                 f"outside the bonded part, which ends {reach:g} ahead of the tip"
             )
-            if self.surface.dim == 1:
+            if stencils.surface.dim == 1:
                 raise InputError(f"{problem}; give a smaller distance")
             # the direction of growth may point out of the side of a body
             log.warn("%s; the stress at its last node is used", problem)
         if len(way.nodes) == 1:
             return way.nodes, np.ones(1)
-        return _on_face(way, way.s[:, None], min(self.distance, reach), self.surface.order)
+        return on_face(way, way.s[:, None], min(distance, reach), stencils.surface.order)
 
     def measure(self, tips: Tips, state: State, time: float) -> Array:
         """Traction in the tip frame (normal, growth direction, front), shape (n, 3) [stress]."""
-        stencil = self.stencil(tips)
+        stencil = self.stencils.at(tips)
         traction = self.probe.bond_forces(stencil.nodes, state)
-        traction = stencil(traction / self.surface.areas[stencil.nodes][..., None])
+        traction = stencil(traction / self.stencils.surface.areas[stencil.nodes][..., None])
         out = np.asarray(np.einsum("nci,nc->ni", tips.frame, traction))
         # a component that symmetry makes vanish must not become a cause of growth by its round-off
         out[np.abs(out) < _ROUND_OFF * np.abs(out).max(initial=0.0)] = 0.0
@@ -181,9 +190,9 @@ class StressEvaluator(_AtDistance):
             f, shape (n,), and the stresses, each of shape (n,) [stress].
         """
         names = ("s11", "s12", "s13")[: self.probe.gdim]
-        f = self.criterion.value(measured, self.temperature_at(tips))
+        f = self.criterion.value(measured, at_nodes(self.temperature, tips.node))
         return f, dict(zip(names, measured.T, strict=False))
 
     def needs(self, tips: Tips) -> Ints:
         """The slave nodes whose forces are used, shape (m,)."""
-        return np.asarray(self.stencil(tips).nodes.ravel())
+        return np.asarray(self.stencils.at(tips).nodes.ravel())

@@ -51,27 +51,19 @@ class VCCT(RateCriterion):
     def __post_init__(self) -> None:
         """Check everything that does not need the interface."""
         super().__post_init__()
-        not_negative(self._owner, viscosity=self.viscosity)
-        keep_floats(self, "viscosity")
-        unstable = self.unstable_tolerance
-        if unstable is None:
-            return
-        if number(self._owner, "unstable_tolerance", unstable) < self.tolerance:
-            raise InputError(
-                f"{self._owner}: unstable_tolerance = {unstable} is below tolerance = "
-                f"{self.tolerance}; give a larger one, math.inf for no limit, or None to switch "
-                "unstable growth off"
-            )
+        _check_release(self)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class EnhancedVCCT(VCCT):
+class EnhancedVCCT(RateCriterion):
     """Growth by VCCT with a toughness for onset and one for propagation.
 
     ``GIc``, ``GIIc``, ``GIIIc`` and everything else of :class:`~fxcrack.criteria.vcct.VCCT` are
     for onset. Values per slave node are not possible.
 
     Attributes:
+        unstable_tolerance: As for :class:`~fxcrack.criteria.vcct.VCCT`.
+        viscosity: Likewise.
         GIc_p: Mode I toughness of propagation [force/length].
         GIIc_p: Mode II toughness of propagation; given when, and only when, GIIc is.
         GIIIc_p: Mode III toughness of propagation; given when, and only when, GIIIc is.
@@ -80,6 +72,8 @@ class EnhancedVCCT(VCCT):
     GIc_p: Property
     GIIc_p: Property | None = None
     GIIIc_p: Property | None = None
+    unstable_tolerance: float | None = None
+    viscosity: float = 0.0
 
     softens: ClassVar[bool] = True
 
@@ -98,6 +92,7 @@ class EnhancedVCCT(VCCT):
                     "allow; give a number, a function of position or a table against temperature"
                 )
         super().__post_init__()
+        _check_release(self)
 
     def _properties(self) -> dict[str, Property]:
         given = {"GIIc_p": self.GIIc_p, "GIIIc_p": self.GIIIc_p}
@@ -123,4 +118,17 @@ class EnhancedVCCT(VCCT):
             nodes,
             temperature,
             n_slave,
+        )
+
+
+def _check_release(criterion: VCCT | EnhancedVCCT) -> None:
+    """Check what belongs to the release of nodes, and make floats of numbers."""
+    owner = type(criterion).__name__
+    not_negative(owner, viscosity=criterion.viscosity)
+    keep_floats(criterion, "viscosity")
+    unstable, tolerance = criterion.unstable_tolerance, criterion.tolerance
+    if unstable is not None and number(owner, "unstable_tolerance", unstable) < tolerance:
+        raise InputError(
+            f"{owner}: unstable_tolerance = {unstable} is below tolerance = {tolerance}; give a "
+            "larger one, math.inf for no limit, or None to switch unstable growth off"
         )

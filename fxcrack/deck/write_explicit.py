@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fxcrack.criteria import VCCT, Criterion, ProgressiveRelease, ReleaseLaw
+from fxcrack.criteria import VCCT, Criterion, EnhancedVCCT, ProgressiveRelease, ReleaseLaw
 from fxcrack.deck.lines import number
 from fxcrack.deck.write_properties import criterion_lines
 from fxcrack.deck.write_steps import refuse
@@ -53,7 +53,7 @@ def explicit_interface(
         refuse(f"interface '{title}', bonded in part without a criterion, in explicit dynamics")
     if release is not None and release != ProgressiveRelease():
         refuse(f"interface '{title}': the release law {release} in explicit dynamics")
-    if isinstance(criterion, VCCT) and (
+    if isinstance(criterion, VCCT | EnhancedVCCT) and (
         criterion.viscosity or criterion.unstable_tolerance is not None
     ):
         refuse(f"interface '{title}': viscosity and unstable_tolerance in explicit dynamics")

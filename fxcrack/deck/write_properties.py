@@ -178,7 +178,7 @@ def _rates(title: str, criterion: RateCriterion, nodal: bool) -> tuple[str, list
         paris = [p.c1, p.c2, p.c3, p.c4, *constant]
         rows = [[*paris, *row, *exponents, *t] for row, t in _against_temperature(given)]
         return f"TYPE=FATIGUE, {head}", _in_eights(rows)
-    assert isinstance(criterion, VCCT)
+    assert isinstance(criterion, VCCT | EnhancedVCCT)
     if criterion.unstable_tolerance is not None:
         value = criterion.unstable_tolerance
         head += ", UNSTABLE GROWTH TOLERANCE" + ("" if math.isinf(value) else f"={number(value)}")

@@ -17,7 +17,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import ConvergenceError
+from fxcrack.base.errors import NO_EQUILIBRIUM, EnergyImbalance
 from fxcrack.equilibrium.contact import Equilibrium, bond_work
 from fxcrack.equilibrium.moving_contact import ImpulseWork
 
@@ -26,10 +26,6 @@ FINE = 1.0 / 512.0
 
 _SMALLEST_PIECE = 1e-4
 """Part of a bond force whose removal is the least that is tried at once."""
-
-
-class EnergyImbalance(ConvergenceError):
-    """Work and energies of an increment do not balance: it is too large."""
 
 
 @dataclass(frozen=True)
@@ -155,14 +151,14 @@ def in_pieces(go: Callable[[float, bool], None]) -> None:
             balance to the tolerance. Where it raises, nothing has changed.
 
     Raises:
-        ConvergenceError: The smallest piece fails as well.
+        SolverError: The smallest piece fails as well: one of :data:`NO_EQUILIBRIUM`.
     """
     done, size = 0.0, 1.0
     while done < 1.0:
         to = min(done + size, 1.0)
         try:
             go(to, size > FINE)
-        except ConvergenceError as error:
+        except NO_EQUILIBRIUM as error:
             size *= 0.5 if isinstance(error, EnergyImbalance) else 0.25
             if size < _SMALLEST_PIECE:
                 raise

@@ -12,7 +12,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.base.errors import ConvergenceError, InputError
+from fxcrack.base.errors import NO_EQUILIBRIUM, ConvergenceError, EnergyImbalance, InputError
 from fxcrack.condensation.iterative import Roles
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
@@ -28,7 +28,6 @@ from fxcrack.solvers.can_fly import can_fly
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
 from fxcrack.solvers.increment_work import (
-    EnergyImbalance,
     IncrementWork,
     TrialIncrement,
     in_pieces,
@@ -257,7 +256,7 @@ class NewtonSolver(InterfaceSolver):
                 follow=follow and not dynamic, largest_force=self.largest_force,
                 moving=dynamic and self._begun,
             )  # fmt: skip
-        except ConvergenceError:
+        except NO_EQUILIBRIUM:
             self._fail()
             raise
         self.interfaces.move_fronts(trial.u)

@@ -18,7 +18,7 @@ import numpy as np
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.errors import ConvergenceError, SolverError
+from fxcrack.base.errors import NO_EQUILIBRIUM, ConvergenceError, SolverError
 from fxcrack.condensation.mumps_schur import mumps_message
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -391,7 +391,7 @@ def solve(problem: InterfaceSnes, y: PETSc.Vec) -> int:
         problem.again(known, whole=True)
         more, reason = _drive(problem, y)
         return _found(problem, iterations + more, reason)
-    except ConvergenceError:
+    except NO_EQUILIBRIUM:
         begin.copy(y)
         problem.again(known, whole=False)
         more, reason = _drive(problem, y)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.errors import ComesApart, ConvergenceError, InputError
+from fxcrack.base.errors import ComesApart, ConvergenceError, EnergyImbalance, InputError
 from fxcrack.base.timings import Timings
 from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -104,7 +104,7 @@ class StepDriver:
             reason = stepping(self)
         except (NotPositiveDefinite, ComesApart) as error:
             reason = _separated(error)
-        except (TooManyCutbacks, ConvergenceError) as error:
+        except (TooManyCutbacks, ConvergenceError, EnergyImbalance) as error:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
         self.record("end")

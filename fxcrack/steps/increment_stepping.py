@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fxcrack.base.errors import ComesApart, ConvergenceError
+from fxcrack.base.errors import ComesApart, ConvergenceError, EnergyImbalance
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.steps.analysis import Analysis, largest
@@ -71,7 +71,7 @@ def step_by_increments(driver: StepDriver) -> str:
         except (NotPositiveDefinite, ComesApart):
             analysis.rollback(saved)  # contact and bonds have changed half of the way
             raise
-        except ConvergenceError as error:
+        except (ConvergenceError, EnergyImbalance) as error:
             analysis.rollback(saved)
             control.rejected(target - analysis.time, str(error))
             continue

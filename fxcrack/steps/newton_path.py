@@ -12,11 +12,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from fxcrack.base import log
-from fxcrack.base.errors import ConvergenceError, InputError
+from fxcrack.base.errors import NO_EQUILIBRIUM, EnergyImbalance, InputError
 from fxcrack.base.roots import Bracket
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
-from fxcrack.solvers.increment_work import FINE, EnergyImbalance
+from fxcrack.solvers.increment_work import FINE
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.steps.analysis import Analysis, largest
 from fxcrack.steps.increment_control import TooManyCutbacks
@@ -115,7 +115,7 @@ class NewtonLoadPath:
                     raise TooManyCutbacks(str(error)) from error
                 log.info("cut back to an increment of %g: %s", size, error)
                 continue
-            except ConvergenceError as error:
+            except NO_EQUILIBRIUM as error:
                 size, accepted = 0.25 * abs(guess - begin), 0
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
@@ -198,7 +198,7 @@ class NewtonLoadPath:
                 point, values = self._try(guess)
                 if not self._solver.exact:
                     self._solver.confirm()
-            except ConvergenceError as error:
+            except NO_EQUILIBRIUM as error:
                 raise TooManyCutbacks(str(error)) from error
             self._analysis.tip_values = values
             self._analysis.advance(point, guess)
@@ -235,7 +235,7 @@ class NewtonLoadPath:
                 guess = bracket.admit(guess, below, above)
             try:
                 point = self._move(guess)
-            except ConvergenceError as error:
+            except NO_EQUILIBRIUM as error:
                 size = 0.25 * abs(guess - begin)
                 if size < _SMALLEST * whole:
                     raise TooManyCutbacks(str(error)) from error
