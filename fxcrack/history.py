@@ -225,9 +225,9 @@ class History:
                 f"crack {title}: length from {a[0]:.6g} to {a[-1]:.6g}, "
                 f"{int(released[-1])} nodes released"
             )
-            first = [r for r in self.rows if r["event"] == "onset" and f"f[{title}]" in r]
-            if first:
-                lines.append(f"  first onset at time {float(first[0]['time']):.6g}")
+            grown = np.flatnonzero(np.diff(released.astype(float)) > 0.0)
+            if len(grown):
+                lines.append(f"  began to grow at time {float(self.rows[grown[0]]['time']):.6g}")
         energies = [c for c in ("external_work", "strain_energy", "released_energy") if c in names]
         if energies and "balance" in names:
             last = ", ".join(f"{c} {float(self[c][-1]):.6g}" for c in energies)

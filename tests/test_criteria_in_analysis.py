@@ -258,7 +258,11 @@ def test_symmetric_half_opens_as_the_whole() -> None:
 def test_watched_criteria_are_reported_and_decide_nothing() -> None:
     stress = fx.CriticalStress(100.0, distance=0.3)
     alone, watched = plate(stress), plate(
-        stress, watch=(fx.CrackOpening(1e-9, distance=0.25), fx.CriticalStress(1.0, distance=0.1))
+        stress, watch=(
+            fx.CrackOpening(1e-9, distance=0.25),
+            fx.CriticalStress(1.0, distance=0.1),
+            fx.CriticalStress(1.0, distance=0.2),
+        )
     )  # fmt: skip
     for scene in (alone, watched):
         run(scene, fx.Releases(4))
@@ -267,6 +271,7 @@ def test_watched_criteria_are_reported_and_decide_nothing() -> None:
     assert set(watched.history.columns) - set(alone.history.columns) == {
         *("cod[bond]", "grown[bond]"),
         *("s11_CriticalStress[bond]", "s12_CriticalStress[bond]"),  # the names s11, s12 are taken
+        *("s11_CriticalStress_2[bond]", "s12_CriticalStress_2[bond]"),
     }
     row = watched.history.at("released[bond]", 2)
     assert row["grown[bond]"] == pytest.approx(0.1)

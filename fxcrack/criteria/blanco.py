@@ -38,7 +38,8 @@ class Blanco:
         m_m: Exponent of mixed mode.
         drive: Driving force D, see :class:`Paris`.
         normalised: Whether D/G_c drives growth, as in the source, or D alone.
-        c1: Factor of onset, N0 = c1 (D/G_c)^c2 [cycles]; 0: growth starts at once.
+        c1: Factor of onset, N0 = c1 x^c2 [cycles], x = D/G_c if
+            `normalised`, else D; 0: growth starts at once.
         c2: Exponent of onset.
         r1: Threshold over toughness, see :class:`Paris`.
         r2: Upper limit of the Paris regime over toughness, likewise.

@@ -36,7 +36,8 @@ class KenaneBenzeggagh:
         q: Exponent of the mode mix in the exponent, positive.
         drive: Driving force D, see :class:`Paris`.
         normalised: Whether D/G_c drives growth, or D alone, as in the source.
-        c1: Factor of onset, N0 = c1 D^c2 [cycles]; 0: growth starts at once.
+        c1: Factor of onset, N0 = c1 x^c2 [cycles], x = D/G_c if
+            `normalised`, else D; 0: growth starts at once.
         c2: Exponent of onset.
         r1: Threshold over toughness, see :class:`Paris`.
         r2: Upper limit of the Paris regime over toughness, likewise.

@@ -63,7 +63,7 @@ class ParisK:
         not_negative("ParisK", dK_th=self.dK_th)
         one_of("ParisK", "state", self.state, ("plane strain", "plane stress"))
         if self.nu is not None:
-            between("ParisK", "nu", self.nu, -1.0, 0.5)
+            between("ParisK", "nu", self.nu, -1.0, 0.5, ends=False)
         elif self.state == "plane strain":
             raise InputError(
                 "ParisK: plane strain needs Poisson's ratio nu, E' = E/(1 - nu^2); give it, or "

@@ -213,7 +213,7 @@ class Crack:
 def _named_apart(
     found: dict[str, Array], report: dict[str, Array], criterion: Criterion
 ) -> dict[str, Array]:
-    """What a watched criterion reports, with the method in names that are taken already.
+    """What a watched criterion reports, with the method, and a number, in names that are taken.
 
     Args:
         found: Its quantities by name.
@@ -221,8 +221,13 @@ def _named_apart(
         criterion: The criterion.
     """
     method = getattr(criterion, "method", type(criterion).__name__)
-    names = {name: f"{name}_{method}" if name in report else name for name in found}
-    return {names[name]: values for name, values in found.items() if names[name] not in report}
+    suffix, number = f"_{method}", 1
+    while True:
+        named = {f"{name}{suffix}" if name in report else name: name for name in found}
+        if not any(name in report for name in named):
+            return {name: found[own] for name, own in named.items()}
+        number += 1
+        suffix = f"_{method}_{number}"
 
 
 def make_evaluator(

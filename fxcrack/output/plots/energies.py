@@ -1,4 +1,4 @@
-"""Energies of an analysis against time: supplied, stored, released, and how well they balance."""
+"""Energies of an analysis against time: supplied, stored, released, dissipated."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from fxcrack.output.plots.style import COLOURS, dress, legend, new_figure, save
 
 WORDS = {
     "external_work": "work of loads and supports",
+    "initial_kinetic_energy": "kinetic energy at the start",
+    "overlap_energy": "supplied to overlapping faces",
     "strain_energy": "strain energy",
     "kinetic_energy": "kinetic energy",
     "released_energy": "energy released by growth",
@@ -22,7 +24,8 @@ WORDS = {
     "viscous_energy": "dissipated by viscosity",
     "damping_energy": "dissipated by damping",
 }
-"""Columns of a history that are energies, and what a legend calls them."""
+"""Columns of a history that are drawn, and what a legend calls them. `snap_energy` is part of the
+energy released by growth."""
 
 
 def energies(
