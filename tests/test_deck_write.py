@@ -157,6 +157,16 @@ def test_large_rotations_friction_and_ties(tmp_path):
         ({"step": fx.Cycles(maximum=1.0, ratio=0.1)}, "without a period that begins at time 0"),
         ({"criterion": fx.VCCT(0.2, method="closure")}, "method='closure'"),
         ({"release": fx.ProgressiveRelease()}, "the release law ProgressiveRelease"),
+        ({"interface": {"pairing": "node-to-surface"}}, "pairing='node-to-surface'"),
+        (
+            {
+                "criterion": fx.Fatigue(
+                    GIc=2.0, paris=fx.Paris(10.0, -1.0, 1e-3, 2.0, 0.01, 0.95), partial=True
+                ),
+                "step": fx.Cycles(period=(0.0, 1.0), n_max=500.0),
+            },
+            "partial=True",
+        ),
         ({"supports": [*PINS, fx.Displacement("far_upper", y=lambda x: x[0])]}, "of position"),
         ({"loads": [fx.Pressure("top", 1.0, follows=True)]}, "follows=True"),
         ({"loads": [fx.Pressure("top", lambda x: x[0])]}, "as a function of position"),

@@ -94,7 +94,7 @@ def run(
     solver = scene.analysis.solver
     assert isinstance(solver, ExplicitSolver)
     once = _once(solver)
-    before = _fastest(once)
+    before = _fastest(comm, once)
     if increments is None:
         increments = int(np.clip(_SECONDS / before, 3, 500))
         increments = int(comm.allreduce(increments, op=MPI.MIN))
@@ -110,7 +110,7 @@ def run(
     history = scene.run(
         Explicit(until=Time(end), rows=_STRETCHES, operator=operator), observers=[mark]
     )
-    after = _fastest(_once(solver))
+    after = _fastest(comm, _once(solver))
     processor, clock, done = (np.diff(column) for column in zip(*marks, strict=True))
     some = done > 0
     per_increment = float(np.min(processor[some] / done[some]))
@@ -144,11 +144,12 @@ def _once(solver: ExplicitSolver) -> Callable[[], Any]:
     return lambda: matrix @ u
 
 
-def _fastest(once: Callable[[], Any], trials: int = 20) -> float:
-    """Seconds of processor time of one call, the fastest of several stretches."""
+def _fastest(comm: MPI.Comm, once: Callable[[], Any], trials: int = 20) -> float:
+    """Seconds of processor time of one call, the fastest of several stretches; collective."""
     start = time.process_time()
     once()
     calls = int(np.clip(_SECONDS / max(time.process_time() - start, 1e-5), 3, 500))
+    calls = comm.allreduce(calls, op=MPI.MIN)  # a call may be collective
     best = np.inf
     for _ in range(trials):
         start = time.process_time()

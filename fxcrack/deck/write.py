@@ -300,6 +300,8 @@ class _Writer:
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
+        if interface.pairing is not None:
+            refuse(f"interface '{title}': pairing='{interface.pairing}'")
         if callable(interface.friction):
             refuse(f"interface '{title}': friction as a function of position")
         slave, master = title, f"{title} master"

@@ -173,6 +173,8 @@ def _rates(title: str, criterion: RateCriterion, nodal: bool) -> tuple[str, list
                 f"write_deck: interface '{title}': a deck has words for a Paris law in dG with "
                 "constant threshold and upper limit only"
             )
+        if criterion.partial:
+            raise InputError(f"write_deck: interface '{title}': partial=True has no word in a deck")
         if criterion.credit:
             raise InputError(f"write_deck: interface '{title}': credit=True has no word in a deck")
         paris = [p.c1, p.c2, p.c3, p.c4, *constant]
