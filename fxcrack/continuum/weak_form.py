@@ -246,6 +246,11 @@ class WeakForm:
             term.begin(time_end, dt)
             term.update(self.u)
 
+    def begin_at(self) -> None:
+        """Begin a motion at the present displacement, at rest; collective."""
+        for term in self.terms:
+            term.begin_at(self.u)
+
     def commit(self) -> None:
         """Accept the present displacement."""
         for term in self.terms:

@@ -317,7 +317,7 @@ class NewtonSolver(InterfaceSolver):
             self.bodies.commit()
         elif inertia is not None:
             self.bodies.set(self.u)
-            inertia.begin_at(self.bodies.u)
+            self.bodies.begin_at()
         if trial.work.contact:
             assert inertia is not None
             inertia.add_loss(trial.work.contact)
