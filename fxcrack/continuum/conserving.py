@@ -20,7 +20,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.fem.petsc
 import numpy as np
 import ufl
@@ -251,8 +251,12 @@ class ConservingForces(Term):
         return {} if self._old == 0.5 else {"numerical_dissipation": self._loss}
 
     def state(self) -> dict[str, Array]:
-        """Displacement of the last commit and what its forces lack, shape (n_dofs,); the loss and
-        whether the bodies have moved, shape (2,)."""
+        """Displacement of the last commit, what its forces lack, energy lost, whether in motion.
+
+        Returns:
+            "u" (length) and "lack" (force): local dofs, ghosts too, shape (n_dofs,); "loss": energy
+            dissipated by the method, and 1 once the bodies have moved, shape (2,).
+        """
         return {
             "u": self._begin.x.array.copy(),
             "lack": self._lack.copy(),

@@ -227,6 +227,15 @@ def deformation_gradient(model: Model, u: Any, x: Any) -> Any:
     return ufl.as_matrix([[f[0, 0], f[0, 1], 0], [f[1, 0], f[1, 1], 0], [0, 0, out]])
 
 
+def displacement_gradient(model: Model, u: Any, x: Any) -> Any:
+    """F - 1, linear in u, shape (3, 3)."""
+    g = ufl.grad(u)
+    if model.gdim == 3:
+        return g
+    out = u[0] / x[0] if isinstance(model, Axisymmetric) else 0
+    return ufl.as_matrix([[g[0, 0], g[0, 1], 0], [g[1, 0], g[1, 1], 0], [0, 0, out]])
+
+
 def cofactor(f: Any) -> Any:
     """J F^-t of a gradient of shape (2, 2) or (3, 3), without division."""
     if f.ufl_shape == (2, 2):

@@ -16,7 +16,13 @@ from petsc4py import PETSc
 
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.kinematics import PlaneStress, cofactor, deformation_gradient, labelled
+from fxcrack.continuum.kinematics import (
+    PlaneStress,
+    cofactor,
+    deformation_gradient,
+    displacement_gradient,
+    labelled,
+)
 from fxcrack.continuum.term import StoringTerm
 from fxcrack.continuum.thermal_strain import expansion
 
@@ -62,7 +68,7 @@ class NeoHookeanBodies(StoringTerm):
         quotient. No temperature.
         """
         c = self._continuum
-        change = deformation_gradient(c.model, v, c.x) - ufl.Identity(3)
+        change = displacement_gradient(c.model, v, c.x)
         total = 0
         for i in self._parts:
             first, _, mu, lame = self._elastic_part(begin, i)

@@ -22,15 +22,16 @@ from stability.combinations import (
 )
 
 BALANCE = {"linear": 1e-8, "newton": 1e-4, "finite": 1e-4, "neo-Hookean": 1e-4, "plastic": 1e-3,
-           "temperature": 1e-4, "inertia": 1e-8, "finite, inertia": 1e-2}  # fmt: skip
+           "temperature": 1e-4, "inertia": 1e-8, "finite, inertia": 1e-8}  # fmt: skip
 """Part of the largest energy that may be missing. Linear bodies: the events of softening bonds are
 found to 1e-6 of their force. Nonlinear ones: increments are divided at 1e-5 each, but for the
-smallest; plastic ones: contact that closes in the smallest leaves the square of it."""
+smallest; plastic ones: contact that closes in the smallest leaves the square of it. Bodies in
+motion keep their energy to the residual of the iteration."""
 
-LIMITS = {"penetration": 1e-8, "force on what is released": 1e-8, "dissipation falls": 1e-8,
+LIMITS = {"penetration": 1e-8, "force on what is released": 1e-6, "dissipation falls": 1e-8,
           "bonded again": 0.0, "f off 1 at onset": 1e-5, "f above 1": 1e-5}  # fmt: skip
-"""Parts of the largest jump, force and work. Onsets of linear bodies are found to 1e-9 of f, those
-of nonlinear ones to 1e-6 of the increment."""
+"""Parts of the largest jump, force and work. Forces of nonlinear bodies are known to 1e-8 of the
+largest in the bodies, which interfaces need not carry; onsets are found to 1e-6."""
 
 KEPT = ("friction_energy", "plastic_energy")
 """Energies that never come back."""
@@ -77,7 +78,9 @@ class Invariants:
 
     def _energies(self, row: Row) -> None:
         self._work = max(self._work, abs(float(row["external_work"])))
-        kept = KEPT if self._c.release != "step" else (*KEPT, "released_energy")
+        # in motion a bond loses its force over an increment in which its faces may close
+        once = self._c.release == "step" and not self._c.dynamic
+        kept = (*KEPT, "released_energy") if once else KEPT
         for name in kept:
             value = float(row.get(name, 0.0))
             self._see("dissipation falls", (self._spent.get(name, 0.0) - value) / self._work)
@@ -89,13 +92,15 @@ class Invariants:
         self._released = max(self._released, released)
         largest = max((float(v) for k, v in row.items() if k.startswith("f[")), default=0.0)
         if self._c.stepping == "increment":
-            if event == "increment" and not self._c.dynamic:
+            # after the first release unstable growth is allowed at any f
+            if event == "increment" and not self._c.dynamic and not released:
                 growth = self._scene.debonds[0].criterion
                 self._see("f above 1", largest - 1.0 - growth.tolerance)
         elif event == "onset":
             # after a release f may be anything above 1: the next one follows at once
             self._see("f off 1 at onset", 1.0 - largest)
-            if self._c.stepping == "path":
+            # faces in friction stick as the load turns back, where f may jump over 1
+            if self._c.stepping == "path" and self._c.friction is None:
                 self._see("f off 1 at onset", largest - 1.0)
         elif event == "bend":
             self._see("f above 1", largest - 1.0)

@@ -9,8 +9,10 @@ picks.
 from __future__ import annotations
 
 import argparse
+import signal
 import sys
 import time
+import traceback
 from collections import defaultdict
 from pathlib import Path
 
@@ -38,6 +40,16 @@ def seeds_of(text: str) -> range:
     return range(int(first), int(last))
 
 
+def _too_long(*_: object) -> None:
+    raise TimeoutError("not done within the limit: " + " < ".join(_stack()))
+
+
+def _stack() -> list[str]:
+    frames = traceback.extract_stack()[:-2]
+    ours = [f"{Path(f.filename).name}:{f.lineno}" for f in frames if "/fxcrack/" in f.filename]
+    return ours[::-1][:8]
+
+
 def main() -> int:
     """Run the scenes; the number of those that fail."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -45,17 +57,21 @@ def main() -> int:
     parser.add_argument("--table", type=Path)
     parser.add_argument("--seconds", type=float, default=float("inf"), help="end after so long")
     parser.add_argument("--log", type=Path, help="append one line per scene")
+    parser.add_argument("--limit", type=int, default=60, help="seconds one scene may take")
     given = parser.parse_args()
+    signal.signal(signal.SIGALRM, _too_long)
     rows: dict[str, list[tuple[float, bool]]] = defaultdict(list)
     begun, count, refused, failed = time.monotonic(), 0, 0, 0
     for seed in given.seeds:
         if time.monotonic() - begun > given.seconds:
             break
         c, start = Combination.of(seed), time.process_time()
+        signal.alarm(given.limit)
         try:
             result, bad = check(c, seed)
         except Exception as error:
             result, bad = Result("failed", {}, None), [f"{type(error).__name__}: {error}"]
+        signal.alarm(0)
         spent = time.process_time() - start
         count += 1
         refused += result.reason.startswith("refused")
