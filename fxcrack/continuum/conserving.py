@@ -115,7 +115,7 @@ class _Cells:
         self._at.x.array[:] = u
         out = np.zeros_like(self._at.x.array)
         self._term.add_residual(out, self._at)
-        return out
+        return np.asarray(out)
 
     def add(self, forces: Array, u: Array) -> None:
         """Add a f_bar + b f(u) to the local dofs."""
