@@ -9,13 +9,13 @@ from fxcrack.base.errors import EnergyError, FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.amplitudes import Amplitude, Integral, Ramp, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
-    Amplitude,
     BodyForce,
     Displacement,
     Moment,
@@ -23,7 +23,6 @@ from fxcrack.continuum.loads import (
     PointForce,
     PointMoment,
     Pressure,
-    Ramp,
     Traction,
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
@@ -157,6 +156,7 @@ __all__ = [
     "History",
     "Inertia",
     "InputError",
+    "Integral",
     "Interface",
     "Interrupted",
     "Isotropic",
@@ -189,6 +189,7 @@ __all__ = [
     "Scene",
     "Section",
     "Shell",
+    "SmoothStep",
     "Solid",
     "Split",
     "Static",
