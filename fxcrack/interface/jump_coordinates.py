@@ -20,6 +20,9 @@ and the states of an interface are statements about single coordinates:
 
 T stays as it is when nodes are released, and slave and master may belong to different ranks.
 
+Nodes at which shells meet in a kink or a T joint follow each other as
+:mod:`fxcrack.continuum.shell_joints` says; they have no jump.
+
 Where the unknowns of a node are more than its displacement (shells), u_s and u_m above are those of
 points on the bonded faces, u_point = P q_node with P = [1 Z] (:mod:`fxcrack.continuum.dof_layout`).
 Solved for the displacement of the slave node, a row of T holds a small block for each master,
@@ -49,6 +52,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -59,6 +63,7 @@ from scipy.sparse.csgraph import connected_components
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
@@ -143,9 +148,16 @@ def build_coordinates(
     gdim, comm = layout.gdim, layout.comm
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
-    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped)
+    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped, further=layout.joints.nodes)
     which, value = supports.at_nodes(nodes)
     check_slaves(pairs, jumped, nodes, which, value, supports)
+    slaves = {
+        int(dof): (pair.title, x)
+        for pair, j in zip(pairs, jumped, strict=True)
+        for dof, x in zip(pair.surface.dofs[j], pair.surface.x[j], strict=True)
+        if len(layout.joints.nodes)
+    }
+    joined, *joint_entries = joint_terms(layout.joints, nodes, which, slaves)
     links = [
         _Link(pair, np.flatnonzero(j), nodes.find(pair.surface.dofs[j]))
         for pair, j in zip(pairs, jumped, strict=True)
@@ -163,7 +175,7 @@ def build_coordinates(
 
     # which owned dofs have a column of their own
     own = np.asarray(supports.which < 0)
-    follows = np.zeros((len(nodes), layout.n_unknowns), dtype=bool)  # other dofs, by T
+    follows = joined  # other dofs, by T
     free_jump = np.zeros_like(follows)
     for link, role in zip(links, roles, strict=True):
         follows[link.nodes, :gdim] = True
@@ -200,6 +212,7 @@ def build_coordinates(
         np.where(which < 0, -1, first + n_retained + which),
         value,
         n_columns,
+        joint_entries,
     )
     mine = layout.dofs(np.arange(len(nodes))[nodes.mine])
     transform = _assemble(
@@ -237,6 +250,7 @@ def _interface_rows(
     support: Ints,
     value: Array,
     n_columns: int,
+    joined: Sequence[Any],
 ) -> sp.csr_matrix:
     """Rows of T for the dofs of all interface nodes, chains composed.
 
@@ -250,6 +264,7 @@ def _interface_rows(
         support: Columns of the supports that prescribe dofs, -1 where none does, same shape.
         value: Entries of these columns, same shape.
         n_columns: Columns of T.
+        joined: Rows, columns and entries of what the nodes of joints follow.
 
     Returns:
         Shape (n_unknowns n_interface_nodes, n_columns).
@@ -265,6 +280,8 @@ def _interface_rows(
     held = np.flatnonzero(prescribed >= 0)
     entries = [(rows, own[rows], np.ones(len(rows))), (held, prescribed[held], value.ravel()[held])]
     followed: list[tuple[Ints, Ints, Array]] = []
+    if len(joined[0]):
+        followed.append((joined[0], joined[1], joined[2]))
     for link, frame, jumps in zip(links, frames, retained, strict=True):
         k, s = link.slaves, link.nodes
         followed += _followed_unknowns(nodes, link, support[s] < 0)
@@ -292,7 +309,7 @@ def _interface_rows(
             "its master; exchange slave and master of one of them"
         )
     composed = base
-    for _ in range(len(links)):
+    for _ in range(len(links) if not len(joined[0]) else 2 * len(links) + 1):
         composed = base + chain @ composed
     return sp.csr_matrix(composed)
 
