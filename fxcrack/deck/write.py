@@ -21,6 +21,7 @@ from fxcrack.base.parallel import all_or_none
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.loads import (
     AmplitudeLike,
     BodyForce,
@@ -401,6 +402,8 @@ class _Writer:
     def _supports(self) -> list[str]:
         cards: list[str] = []
         for support in self.scene.input.supports:
+            if isinstance(support, Coupling | Equation):
+                refuse(f"the constraint {type(support).__name__}('{support.title}')")
             self._name_nodes(support.title, support.where)
             cards += self._support(support)
         return cards
