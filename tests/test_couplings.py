@@ -142,6 +142,7 @@ def test_components_and_symmetry() -> None:
 
 
 @pytest.mark.mpi
+@pytest.mark.three
 def test_the_mean_motion() -> None:
     """A prescribed mean is reached, and what pulls is spread evenly over the weights.
 
@@ -206,6 +207,7 @@ def test_an_equation_with_one_node() -> None:
 
 
 @pytest.mark.mpi
+@pytest.mark.three
 def test_crack_between_blocks() -> None:
     """A DCB opened by blocks that may turn grows like one pulled at its pins.
 
@@ -250,6 +252,7 @@ def ended(comm: Any = MPI.COMM_WORLD) -> fx.Mesh:
 
 
 @pytest.mark.mpi
+@pytest.mark.three
 def test_bonded_end_in_one_rigid_set() -> None:
     """Both faces of a bond in one rigid set: it carries nothing there.
 

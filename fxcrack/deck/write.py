@@ -18,10 +18,10 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
-from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.loads import (
     AmplitudeLike,
     BodyForce,
