@@ -26,6 +26,7 @@ from fxcrack.continuum.loads import (
     Pressure,
     Ramp,
     Traction,
+    constant,
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
@@ -205,6 +206,7 @@ __all__ = [
     "Walker",
     "bond_table",
     "checkpoints",
+    "constant",
     "displacement_function",
     "from_dolfinx",
     "front_lines",

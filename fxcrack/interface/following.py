@@ -441,7 +441,14 @@ def collect_following(
     equations = [c for c in constraints if isinstance(c, Equation)]
     for number, equation in enumerate(equations, start=len(groups)):
         rows.equate(equation, number)
-    return rows.following(), rows.prescribed
+    following, layout = rows.following(), continuum.layout
+    joints = layout.joints.nodes
+    if len(joints) and following.marks(layout.dofs(joints)).any():
+        raise InputError(
+            "couplings and equations cannot move nodes at which shells meet at a kink or in a T; "
+            "leave them out of their groups"
+        )
+    return following, rows.prescribed
 
 
 __all__ = ["Following", "Prescribed", "collect_following"]

@@ -20,6 +20,9 @@ and the states of an interface are statements about single coordinates:
 
 T stays as it is when nodes are released, and slave and master may belong to different ranks.
 
+Nodes at which shells meet in a kink or a T joint follow each other as
+:mod:`fxcrack.continuum.shell_joints` says; they have no jump.
+
 Where the unknowns of a node are more than its displacement (shells), u_s and u_m above are those of
 points on the bonded faces, u_point = P q_node with P = [1 Z] (:mod:`fxcrack.continuum.dof_layout`).
 Solved for the displacement of the slave node, a row of T holds a small block for each master,
@@ -54,6 +57,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -66,6 +70,7 @@ from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.constrained_slaves import drop_constrained
 from fxcrack.interface.following import Following
+from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
@@ -150,10 +155,17 @@ def build_coordinates(
     gdim, comm = layout.gdim, layout.comm
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
-    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped)
+    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped, further=layout.joints.nodes)
     which, value = supports.at_nodes(nodes)
     check_slaves(pairs, jumped, nodes, which, value, supports)
     rigid = drop_constrained(pairs, jumped, supports.following, layout)
+    slaves = {
+        int(dof): (pair.title, x)
+        for pair, j in zip(pairs, jumped, strict=True)
+        for dof, x in zip(pair.surface.dofs[j], pair.surface.x[j], strict=True)
+        if len(layout.joints.nodes)
+    }
+    joined, *joint_entries = joint_terms(layout.joints, nodes, which, slaves)
     links = [
         _Link(pair, np.flatnonzero(j), nodes.find(pair.surface.dofs[j]))
         for pair, j in zip(pairs, jumped, strict=True)
@@ -177,7 +189,7 @@ def build_coordinates(
     if following is not None:
         constrained = following.mine(layout)[1]
         own[constrained] = False
-    follows = np.zeros((len(nodes), layout.n_unknowns), dtype=bool)  # other dofs, by T
+    follows = joined  # other dofs, by T
     free_jump = np.zeros_like(follows)
     for link, role in zip(links, roles, strict=True):
         follows[link.nodes, :gdim] = True
@@ -218,6 +230,7 @@ def build_coordinates(
         np.where(which < 0, -1, first + n_retained + which),
         value,
         n_columns,
+        joint_entries,
         composed,
     )
     mine = layout.dofs(np.arange(len(nodes))[nodes.mine])
@@ -262,6 +275,7 @@ def _interface_rows(
     support: Ints,
     value: Array,
     n_columns: int,
+    joined: Sequence[Any],
     constrained: tuple[Ints, sp.csr_matrix] | None,
 ) -> sp.csr_matrix:
     """Rows of T for the dofs of all interface nodes, chains composed.
@@ -276,6 +290,7 @@ def _interface_rows(
         support: Columns of the supports that prescribe dofs, -1 where none does, same shape.
         value: Entries of these columns, same shape.
         n_columns: Columns of T.
+        joined: Rows, columns and entries of what the nodes of joints follow.
         constrained: Global dofs that follow by couplings and equations, ascending, and their rows.
 
     Returns:
@@ -299,6 +314,8 @@ def _interface_rows(
         block = its_rows[at[inside]].tocoo()
         entries.append((inside[block.row], block.col, block.data))
     followed: list[tuple[Ints, Ints, Array]] = []
+    if len(joined[0]):
+        followed.append((joined[0], joined[1], joined[2]))
     for link, frame, jumps in zip(links, frames, retained, strict=True):
         k, s = link.slaves, link.nodes
         followed += _followed_unknowns(nodes, link, support[s] < 0)
@@ -326,7 +343,7 @@ def _interface_rows(
             "its master; exchange slave and master of one of them"
         )
     composed = base
-    for _ in range(len(links)):
+    for _ in range(len(links) if not len(joined[0]) else 2 * len(links) + 1):
         composed = base + chain @ composed
     return sp.csr_matrix(composed)
 

@@ -16,6 +16,7 @@ from fxcrack.base.errors import InputError, InterfaceError, raise_on_all_ranks
 from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint, Coupling, Equation
+from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry, rotation_values
 from fxcrack.continuum.shell_bodies import ShellBodies
@@ -195,6 +196,7 @@ def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Su
             scale = high if moves and low == high else 1.0
             columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale))
     raise_on_all_ranks(continuum.comm, problem)
+    _share_at_joints(layout, which, value, columns)
     for i, column in enumerate(columns):
         # a component that stays zero keeps a column of ones, which gives its reaction
         value[which == i] = 1.0 if not column.moves else value[which == i] / column.scale
@@ -207,6 +209,45 @@ def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Su
             SupportColumn(motion.title, motion.constraint, moved, motion.value if moved else 1.0)
         )
     return Supports(tuple(columns), which, value, following, len(motions), tuple(constraints))
+
+
+def _share_at_joints(
+    layout: DofLayout, which: Ints, value: Array, columns: Sequence[SupportColumn]
+) -> None:
+    """Prescribe the displacement of all nodes of a joint as that of one is, in place; collective.
+
+    Raises:
+        InterfaceError: Supports prescribe different displacements of them.
+    """
+    joints = layout.joints
+    if not len(joints.nodes):
+        return
+    nodes = InterfaceNodes(layout, joints.nodes)
+    dofs = layout.dof(nodes.local[:, None], np.arange(layout.gdim))
+    at = nodes.find(joints.nodes)
+    column, wanted = nodes.share(which[dofs])[at], nodes.share(value[dofs])[at]
+    for rows in joints.groups():
+        for c in range(layout.gdim):
+            held = rows[column[rows, c] >= 0]
+            if not len(held):
+                continue
+            first = held[0]
+            one = columns[column[first, c]]
+            for r in held[1:]:
+                other = columns[column[r, c]]
+                if wanted[r, c] != wanted[first, c] or (
+                    wanted[r, c] != 0.0 and other.support.amplitude != one.support.amplitude
+                ):
+                    raise InterfaceError(
+                        f"supports '{one.title}' and '{other.title}' prescribe different "
+                        "displacements of nodes at which shells meet; let only one of them hold "
+                        "the joint"
+                    )
+            free = np.setdiff1d(rows, held)
+            column[free, c], wanted[free, c] = column[first, c], wanted[first, c]
+    mine = layout.is_owned(joints.nodes)
+    dofs = layout.dof(layout.to_local(joints.nodes[mine])[:, None], np.arange(layout.gdim))
+    which[dofs], value[dofs] = column[mine], wanted[mine]
 
 
 def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
