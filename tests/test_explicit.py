@@ -114,7 +114,8 @@ def test_non_matching_faces_spend_the_toughness(comm: MPI.Intracomm) -> None:
     assert imbalance(history) <= 1e-10
     # bonds that share masters are solved in sweeps, of which stiff ones need more than there are
     assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=2e-6)
-    assert np.all(history["tie_energy"][1:] >= 0.0)
+    # kinetic energies are subtracted, so what is none is round-off of either sign
+    assert np.all(history["tie_energy"] >= -1e-12 * history["external_work"][-1])
     assert history["tie_energy"][-1] <= 1e-3 * history["external_work"][-1]
 
 

@@ -127,7 +127,9 @@ class ExplicitSolver:
         chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
         self.motion = BodyMotion(self.bodies, chosen)
-        self._now: Array | None = None  # coordinates of the present increment
+        # coordinates at the start of the present increment and at its end
+        self._now: Array | None = None
+        self._then = np.zeros(self.n_loads)
         self._files = MotionFiles(continuum)
         zero = np.zeros(self.lumped.n_rows * continuum.gdim)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
@@ -255,7 +257,8 @@ class ExplicitSolver:
         t0 = clock.perf_counter()
         columns = len(self.supports.columns)
         self._h = 0.5 * (self.last_dt + self.dt)
-        self._now, self._loads, self._coordinates = now, now[columns:], then[:columns]
+        self._now, self._then = now, then
+        self._loads, self._coordinates = now[columns:], then[:columns]
         chosen = self._at_chosen
         self.motion.forces(chosen, self._h)
         np.negative(chosen, out=chosen)
@@ -433,6 +436,7 @@ class ExplicitSolver:
             self.bodies.u.x.array[:n].copy(), self.velocity.copy(),
             InterfaceSnapshot.of(self.dynamics), self.at, self.last_dt,
             self.energies.totals(), self.increments,
+            None if self._now is None else (self._now, self._then),
         )  # fmt: skip
 
     def recall(self, saved: MotionSnapshot) -> None:
@@ -446,9 +450,8 @@ class ExplicitSolver:
         self.dynamics.u = self.lumped.nodes.gather(x.array[:n])
         self.dynamics.v = self.lumped.nodes.gather(self.velocity)
         saved.interfaces.restore(self.dynamics)
-        if self._now is not None:
-            columns = len(self.supports.columns)
-            self.begin(self._now, np.append(self._coordinates, self._now[columns:]))
+        if saved.coordinates is not None:
+            self.begin(*saved.coordinates)
 
     def collect(self) -> Arrays:
         """The state at the start of this increment as plain arrays; collective.

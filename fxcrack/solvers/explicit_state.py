@@ -101,6 +101,8 @@ class MotionSnapshot:
         sums: Work of supports and loads, energy of damping, energy at the start and energy gone
             with changes of the increment, sums over all ranks; force times length.
         increments: How many were done.
+        coordinates: Coordinates of support columns and load factors at the start of the increment
+            and at its end, shape (n_loads,) each; ``None`` where they are not known.
     """
 
     u: Array
@@ -110,6 +112,7 @@ class MotionSnapshot:
     last_dt: float
     sums: tuple[float, float, float, float]
     increments: int
+    coordinates: tuple[Array, Array] | None = None
 
 
 class MotionFiles:
