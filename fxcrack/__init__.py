@@ -11,6 +11,7 @@ from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.amplitudes import Amplitude, Integral, Ramp, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
@@ -24,6 +25,7 @@ from fxcrack.continuum.loads import (
     PointMoment,
     Pressure,
     Traction,
+    constant,
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
@@ -130,6 +132,7 @@ __all__ = [
     "Clamp",
     "CondensedOptions",
     "ContinuumShell",
+    "Coupling",
     "CrackLength",
     "CrackLengthVsTime",
     "CrackOpening",
@@ -144,6 +147,7 @@ __all__ = [
     "Elber",
     "EnergyError",
     "EnhancedVCCT",
+    "Equation",
     "Evaluator",
     "Explicit",
     "Face",
@@ -203,6 +207,7 @@ __all__ = [
     "Walker",
     "bond_table",
     "checkpoints",
+    "constant",
     "displacement_function",
     "from_dolfinx",
     "front_lines",

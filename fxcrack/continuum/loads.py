@@ -357,3 +357,21 @@ class Monitor:
     def terms(self) -> list[Monitor]:
         """This monitor and all that are added to it."""
         return [self, *(term for monitor in self.plus for term in monitor.terms)]
+
+
+__all__ = [
+    "Amplitude",
+    "AmplitudeLike",
+    "BodyForce",
+    "Displacement",
+    "Field",
+    "Load",
+    "Moment",
+    "Monitor",
+    "PointForce",
+    "PointMoment",
+    "Pressure",
+    "Ramp",
+    "Traction",
+    "constant",
+]

@@ -19,6 +19,7 @@ from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
 from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
@@ -405,6 +406,8 @@ class _Writer:
     def _supports(self) -> list[str]:
         cards: list[str] = []
         for support in self.scene.input.supports:
+            if isinstance(support, Coupling | Equation):
+                refuse(f"the constraint {type(support).__name__}('{support.title}')")
             self._name_nodes(support.title, support.where)
             cards += self._support(support)
         return cards

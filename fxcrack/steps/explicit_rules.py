@@ -8,6 +8,7 @@ from typing import Any
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.criteria import VCCT
 from fxcrack.interface.pairing import Interface
@@ -62,6 +63,20 @@ def check_start(continuum: Continuum) -> None:
                 "Explicit: start='equilibrium' does not know what bodies that yield have gone "
                 "through; begin at rest, and apply the loads slowly (SmoothStep)"
             )
+
+
+def check_constraints(constraints: Sequence[Constraint]) -> None:
+    """Refuse couplings and equations, which lumped masses do not know.
+
+    Raises:
+        InputError: There is one.
+    """
+    if constraints:
+        raise InputError(
+            f"Explicit: couplings and equations ('{constraints[0].title}') are not available in "
+            "explicit dynamics; prescribe the displacements of the nodes by Displacement, or load "
+            "them by PointForce"
+        )
 
 
 def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> None:

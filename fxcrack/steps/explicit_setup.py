@@ -15,7 +15,7 @@ from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_bodies, inertia_of
+from fxcrack.steps.explicit_rules import check_bodies, check_constraints, inertia_of
 
 
 def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequence[Term]]) -> None:
@@ -38,6 +38,7 @@ def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequenc
             "go on; make another scene for it, scene.rebuilt()"
         )
     check_bodies(analysis.continuum)
+    check_constraints(old.supports.constraints)
     found = terms(analysis.continuum)
     heat: list[Any] = []
     if is_linear(analysis.continuum) and all(
