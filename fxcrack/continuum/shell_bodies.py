@@ -35,6 +35,7 @@ from fxcrack.continuum.shell_frames import (
     nodal_directors,
     section_axes,
 )
+from fxcrack.continuum.shell_joints import find_joints
 from fxcrack.continuum.shell_layout import ShellLayout
 from fxcrack.continuum.shell_strains import ShellElement, shell_element
 from fxcrack.continuum.strain_cells import StrainCells
@@ -82,7 +83,8 @@ class ShellBodies(Continuum):
 
     Raises:
         InputError: A cell shape or order that does not exist, sections that do not cover the
-            cells once, an axis across the shell, a kink, a surface with one side.
+            cells once, an axis across the shell, a kink whose smooth parts share their nodes, a
+            surface with one side.
     """
 
     layout: ShellLayout
@@ -113,6 +115,7 @@ class ShellBodies(Continuum):
         self.signs = cell_signs(mesh, self._upward(n_cells))
         self.directors = nodal_directors(self.space, self._normals_at_nodes(), mesh.name)
         self.layout = ShellLayout(self.comm, self.directors, self.layout.n_owned, self.height)
+        self.layout.joints = find_joints(mesh, self.space, self.order, self.directors)
         self.shell_parts = [
             self._part(s, c) for s, c in zip(self.sections, self.part_cells, strict=True)
         ]

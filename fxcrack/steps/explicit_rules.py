@@ -8,6 +8,7 @@ from typing import Any
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import Load, Pressure
 from fxcrack.criteria import VCCT
@@ -72,6 +73,20 @@ def check_bodies(continuum: Continuum, loads: Sequence[Load]) -> None:
                 f"Explicit: pressure '{load.title}' follows the bodies, which explicit dynamics "
                 "does not have; use follows=False, or a Dynamic step"
             )
+
+
+def check_constraints(constraints: Sequence[Constraint]) -> None:
+    """Refuse couplings and equations, which lumped masses do not know.
+
+    Raises:
+        InputError: There is one.
+    """
+    if constraints:
+        raise InputError(
+            f"Explicit: couplings and equations ('{constraints[0].title}') are not available in "
+            "explicit dynamics; prescribe the displacements of the nodes by Displacement, or load "
+            "them by PointForce"
+        )
 
 
 def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> None:
