@@ -11,6 +11,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.criteria import VCCT
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.pairing import Interface
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit_release import law_of
@@ -38,8 +39,8 @@ def inertia_of(effects: Sequence[Any]) -> Inertia:
     return effect
 
 
-def check_bodies(continuum: Continuum) -> None:
-    """Refuse bodies that explicit dynamics does not have.
+def check_bodies(continuum: Continuum, loads: Sequence[Any]) -> None:
+    """Refuse bodies and loads that explicit dynamics does not have.
 
     Raises:
         InputError: Says which, and what to do instead.
@@ -49,6 +50,12 @@ def check_bodies(continuum: Continuum) -> None:
             "Explicit needs first-order elements: row sums of second-order ones give corner nodes "
             "a negative mass; write Scene(..., order=1), or use a Dynamic step"
         )
+    for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"Explicit: pressure '{load.title}' with follows_crack is not available in "
+                "explicit dynamics; use a Static or Dynamic step"
+            )
 
 
 def check_start(continuum: Continuum) -> None:
