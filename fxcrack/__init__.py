@@ -10,6 +10,7 @@ from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum_shell import ContinuumShell
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
@@ -132,6 +133,7 @@ __all__ = [
     "Clamp",
     "CondensedOptions",
     "ContinuumShell",
+    "Coupling",
     "CrackLength",
     "CrackLengthVsTime",
     "CrackOpening",
@@ -146,6 +148,7 @@ __all__ = [
     "Elber",
     "EnergyError",
     "EnhancedVCCT",
+    "Equation",
     "Evaluator",
     "Explicit",
     "Face",

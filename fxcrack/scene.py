@@ -16,6 +16,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.base.together import check_same_call, in_collective_call
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Model, Shell
 from fxcrack.continuum.loads import Displacement, Load, Monitor
@@ -57,7 +58,7 @@ class Scene:
         mesh: Mesh with named groups.
         materials: One material (a :class:`Section` of shells), or one per cell group.
         model: Kinematic model.
-        supports: Prescribed displacements.
+        supports: Prescribed displacements, rigid couplings and linear equations.
         loads: Force patterns.
         debonds: Interfaces that may come apart, with their criterion.
         bonds: Interfaces that stay as they are (bonded parts tied, open parts open).
@@ -85,7 +86,7 @@ class Scene:
         *,
         materials: Material | Section | Mapping[str, Material] | Mapping[str, Section],
         model: Model | Shell,
-        supports: Sequence[Displacement | Support] = (),
+        supports: Sequence[Displacement | Support | Constraint] = (),
         loads: Sequence[Load] = (),
         debonds: Sequence[Debond] = (),
         bonds: Sequence[Interface] = (),

@@ -18,6 +18,7 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
@@ -401,6 +402,8 @@ class _Writer:
     def _supports(self) -> list[str]:
         cards: list[str] = []
         for support in self.scene.input.supports:
+            if isinstance(support, Coupling | Equation):
+                refuse(f"the constraint {type(support).__name__}('{support.title}')")
             self._name_nodes(support.title, support.where)
             cards += self._support(support)
         return cards
@@ -456,6 +459,8 @@ class _Writer:
         if title != load.where and self.mesh is not None:
             self.sets += self._surface(title, self.mesh.groups[_group(load.where)][1])
         if isinstance(load, Pressure):
+            if load.follows_crack:
+                refuse(f"pressure '{title}' with follows_crack")
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
                 refuse(

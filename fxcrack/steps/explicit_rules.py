@@ -8,9 +8,11 @@ from typing import Any
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import Load, Pressure
 from fxcrack.criteria import VCCT
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.pairing import Interface
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit_release import law_of
@@ -61,11 +63,30 @@ def check_bodies(continuum: Continuum, loads: Sequence[Load]) -> None:
             "Dynamic step"
         )
     for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"Explicit: pressure '{load.title}' with follows_crack is not available in "
+                "explicit dynamics; use a Static or Dynamic step"
+            )
         if isinstance(load, Pressure) and load.follows:
             raise InputError(
                 f"Explicit: pressure '{load.title}' follows the bodies, which explicit dynamics "
                 "does not have; use follows=False, or a Dynamic step"
             )
+
+
+def check_constraints(constraints: Sequence[Constraint]) -> None:
+    """Refuse couplings and equations, which lumped masses do not know.
+
+    Raises:
+        InputError: There is one.
+    """
+    if constraints:
+        raise InputError(
+            f"Explicit: couplings and equations ('{constraints[0].title}') are not available in "
+            "explicit dynamics; prescribe the displacements of the nodes by Displacement, or load "
+            "them by PointForce"
+        )
 
 
 def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> None:

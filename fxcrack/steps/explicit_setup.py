@@ -13,7 +13,7 @@ from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_bodies, inertia_of
+from fxcrack.steps.explicit_rules import check_bodies, check_constraints, inertia_of
 
 
 def use_explicit_solver(
@@ -39,6 +39,7 @@ def use_explicit_solver(
             "go on; make another scene for it, scene.rebuilt()"
         )
     check_bodies(analysis.continuum, loads)
+    check_constraints(old.supports.constraints)
     solver = ExplicitSolver(
         analysis.continuum, analysis.pairs, old.supports, old.loads, old.monitors,
         terms=terms(analysis.continuum), effect=effect,
