@@ -24,7 +24,6 @@ from fxcrack.continuum.materials import stiffness_of
 from fxcrack.continuum.temperature import ByTemperature, expansion_of
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import FaceTractions, loads_on_faces
-from fxcrack.criteria.front_cells import CellSource, FrontCells
 from fxcrack.criteria.front_ring import (
     CellGeometry,
     TipState,
@@ -35,6 +34,7 @@ from fxcrack.criteria.front_ring import (
 from fxcrack.criteria.outer_faces import outer_faces
 from fxcrack.criteria.probe import Bodies, FrontProbe, State
 from fxcrack.criteria.virtual_extension import Corners, FrontLine
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import gather_surface
 from fxcrack.interface.tips import Tips
 
@@ -178,7 +178,7 @@ class DomainIntegral:
         self._loads = list(self._bodies.loads)
         self._body_forces = [k for k, x in enumerate(self._loads) if isinstance(x, BodyForce)]
         groups = [self._loads[k].where for k in self._body_forces]
-        self._source = CellSource(continuum, groups)
+        self._cells = self._bodies.cells_around(groups)
         self._on_faces = loads_on_faces(continuum, self._loads)
         self._slaves = probe.pair.surface.dofs
         self._masters = gather_surface(continuum, probe.pair.sides[1]).dofs
@@ -206,11 +206,12 @@ class DomainIntegral:
             masters = pair.masters[node][np.abs(pair.weights[node]) > 1e-9]
             here.append(np.unique(np.append(masters, surface.dofs[node])))
         tangent = tips.frame[:, :gdim, 2] if gdim == 3 else np.zeros((len(tips), 2))
-        size = self._source.sizes(here, x[:, :gdim], tangent)
+        size = self._cells.sizes(here, x[:, :gdim], tangent)
         behind = np.maximum(tips.d_behind, tips.d_ahead)
         size = np.maximum(size, behind)
-        wide = np.max([self._rings * size.max(initial=0.0), _reach(line)])
-        cells = self._source.near(x[:, :gdim], np.full(len(x), wide))
+        # from the front, which runs between the tips
+        wide = np.hypot(self._rings * size.max(initial=0.0), 0.5 * _reach(line))
+        cells = self._cells.near(x[:, :gdim], np.full(len(x), wide))
         corners = Corners(cells, line)
         rings = [
             self._make(tips, i, line, cells, corners, float(size[i])) for i in range(len(tips))
@@ -240,7 +241,8 @@ class DomainIntegral:
             q = corners.extension(tips, i, layers * size, core)[corners.of_cell]
             rows = np.flatnonzero(np.abs(q).max(axis=(1, 2)) > 0.0)
             parts = [np.unique(cells.part[rows[above[rows] == side]]) for side in (True, False)]
-            alike = all(len(p) == 1 for p in parts)
+            # a side without cells has no material that could differ
+            alike = all(len(p) <= 1 for p in parts)
             if alike:
                 break
         if not len(rows):
@@ -264,7 +266,7 @@ class DomainIntegral:
             parts = [p if len(p) else parts[1 - k] for k, p in enumerate(parts)]
         return self._fill(
             tips, i, line, cells.chosen(rows), q[rows], above[rows],
-            [int(p[0]) for p in parts], layers * size, corners,
+            [int(p[0]) for p in parts], layers * size,
         )  # fmt: skip
 
     def _fill(
@@ -277,7 +279,6 @@ class DomainIntegral:
         above: Bools,
         parts: list[int],
         radius: float,
-        corners: Corners,
     ) -> Ring:
         """A ring of given cells and extension at their corners."""
         continuum, gdim = self._continuum, self._probe.gdim
@@ -314,7 +315,7 @@ class DomainIntegral:
         pressed = np.einsum("mcqij,cij->mcq", stress, _strain_tensor(expansion))
         by_rise += np.einsum("mcq,pcq->mp", pressed, slope)
         body, by_load = self._body(cells, geometry, shift, tip.gradient)
-        faces = FaceTractions(self._on_faces, corners, q, cells, nodes, len(self._loads), gdim=gdim)
+        faces = FaceTractions(self._on_faces, q, cells, above, nodes, len(self._loads), gdim=gdim)
         by_load -= faces.interaction(fields, origin, m)
         by_node = np.zeros((m, len(nodes), gdim))
         outer = outer_faces(
@@ -347,7 +348,7 @@ class DomainIntegral:
         if not n:
             empty = np.zeros((0, *geometry.weight.shape))
             return empty, empty
-        table = self._source.temperature_table(geometry.tables.points)
+        table = self._cells.temperature_table(geometry.tables.points)
         rise = np.einsum("qa,cpa->pcq", table, cells.temperatures)
         slope = geometry.slope(np.moveaxis(cells.nodal_temperatures, 1, 0))
         return rise, np.einsum("pcqi,cqi->pcq", slope, shift)

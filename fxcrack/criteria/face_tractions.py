@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Pressure, Traction
 from fxcrack.criteria.crack_tip_fields import TipFields
-from fxcrack.criteria.front_cells import FrontCells
-from fxcrack.criteria.virtual_extension import Corners
+from fxcrack.interface.crack_pressure import CrackPressure
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import FacetSurface, gather_surface, shape_functions
 
 
@@ -33,7 +34,17 @@ class LoadedFaces:
 
 
 def loads_on_faces(continuum: Continuum, loads: list[Any]) -> list[LoadedFaces]:
-    """The tractions and pressures among some loads, with their facets; collective."""
+    """The tractions and pressures among some loads, with their facets; collective.
+
+    Raises:
+        InputError: One of them is a pressure that follows the crack.
+    """
+    for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"method='domain' does not know pressures that follow the crack (pressure "
+                f"'{load.title}'); use method='vcct' or 'closure'"
+            )
     return [
         LoadedFaces(k, load, gather_surface(continuum, load.where))
         for k, load in enumerate(loads)
@@ -53,7 +64,8 @@ class _Facets:
         force: Traction times area at the points, shape (n, n_points, gdim).
         x: The points, shape (n, n_points, 3).
         shift: Extension at the points, shape (n, n_points, 3).
-        normal: Outward normals, likewise.
+        above: Whether the cell of each is on the side the normal of the interface points to, shape
+            (n,).
     """
 
     number: int
@@ -62,7 +74,7 @@ class _Facets:
     force: Array
     x: Array
     shift: Array
-    normal: Array
+    above: Bools
 
 
 class FaceTractions:
@@ -70,9 +82,9 @@ class FaceTractions:
 
     Args:
         loaded: All loaded faces of the scene.
-        corners: Corners around the front.
         q: Extension at the corners of the ring's cells, shape (n_cells, n_corners, gdim).
         cells: These.
+        above: Whether each of them is on the side the normal points to, shape (n_cells,).
         nodes: Global displacement nodes of the ring, sorted, shape (n_nodes,).
         n_loads: Number of load factors.
         gdim: Components of a displacement.
@@ -81,9 +93,9 @@ class FaceTractions:
     def __init__(
         self,
         loaded: list[LoadedFaces],
-        corners: Corners,
         q: Array,
         cells: FrontCells,
+        above: Bools,
         nodes: Ints,
         n_loads: int,
         *,
@@ -93,6 +105,7 @@ class FaceTractions:
         shift = np.zeros((len(nodes), 3))
         ids = np.searchsorted(nodes, cells.nodes[:, : cells.n_corners])
         shift[ids.ravel(), :gdim] = q.reshape(-1, gdim)
+        self._above = _sides(cells, above)
         self._facets = [f for f in (self._find(x, nodes, shift) for x in loaded) if f is not None]
 
     def _find(self, faces: LoadedFaces, nodes: Ints, shift: Array) -> _Facets | None:
@@ -122,7 +135,11 @@ class FaceTractions:
         breadth = np.einsum("qa,fa->fq", values, s.breadth[facets])
         traction = _traction(faces.load, x, normals)
         force = traction * (size * breadth * weights)[..., None]
-        return _Facets(faces.number, at[facets], along, force[..., : self._gdim], x, q, normals)
+        # a facet that moves belongs to a cell of the ring, whose side of the interface is its own
+        above = [self._above[tuple(sorted(k))] for k in s.dofs[corner[rows]].tolist()]
+        return _Facets(
+            faces.number, at[facets], along, force[..., : self._gdim], x, q, np.array(above)
+        )
 
     def work(self, u: Array, load: Array) -> float:
         """The term in a state.
@@ -147,16 +164,22 @@ class FaceTractions:
         """
         out = np.zeros((n_modes, self._n_loads))
         for f in self._facets:
-            # the outward normal of the side the interface normal points to is opposite to it
-            side = np.einsum("fqc,c->fq", f.normal, fields.axes[1]).mean(axis=1) > 0.0
-            for number, rows in enumerate((~side, side)):
+            for side, rows in enumerate((f.above, ~f.above)):
                 if not rows.any():
                     continue
                 x = (f.x[rows] - origin).reshape(-1, 3)
-                found = fields.gradients(x, number)[:n_modes]
+                found = fields.gradients(x, side)[:n_modes]
                 tip = found.reshape(n_modes, int(rows.sum()), -1, 3, 3)[..., : self._gdim, :]
                 out[:, f.number] += np.einsum("fqc,mfqcj,fqj->m", f.force[rows], tip, f.shift[rows])
         return out
+
+
+def _sides(cells: FrontCells, above: Bools) -> dict[tuple[int, ...], bool]:
+    """The side of the cell behind each boundary facet of some cells, by its sorted corner nodes."""
+    corners = np.sort(cells.nodes[:, cells.facet_corners], axis=2)
+    row, facet = np.nonzero(cells.outer)
+    keys = corners[row, facet].tolist()
+    return {tuple(k): bool(v) for k, v in zip(keys, above[row], strict=True)}
 
 
 @lru_cache(maxsize=4)

@@ -26,7 +26,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Bools
 from fxcrack.criteria.crack_tip_fields import VOIGT, TipFields
-from fxcrack.criteria.front_cells import FrontCells
+from fxcrack.interface.front_cells import FrontCells
 
 _DEGREE = 6
 """Quadrature degree in a ring at least: the fields of a tip are no polynomials."""

@@ -16,8 +16,8 @@ import numpy as np
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import edge_quadrature
-from fxcrack.criteria.front_cells import FrontCells
 from fxcrack.criteria.front_ring import CellGeometry, tensor_of_stress, voigt_strain
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import closure_table, shape_functions
 
 

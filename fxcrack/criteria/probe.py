@@ -15,11 +15,42 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.criteria.crack_closure import opens
 from fxcrack.interface.front import Front
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.tips import Tips
 
 State = Any
 """A state of the solver, e.g. an equilibrium; criteria pass it to the probe and read nothing."""
+
+
+class CellsAround(Protocol):
+    """The cells of the bodies, of which those near some positions can be had on every rank."""
+
+    def sizes(self, nodes: list[Ints], x: Array, along: Array) -> Array:
+        """How far the cells at some nodes reach from a position; collective.
+
+        Args:
+            nodes: Global displacement nodes, per position those that lie there.
+            x: Positions, shape (n, gdim) [length].
+            along: Unit vectors of the front, along which nothing is measured, shape (n, gdim).
+
+        Returns:
+            Shape (n,) [length].
+        """
+        ...
+
+    def near(self, x: Array, radius: Array) -> FrontCells:
+        """Cells that reach into spheres around some positions, the same on every rank; collective.
+
+        Args:
+            x: Positions, shape (n, gdim) [length].
+            radius: Radii, shape (n,) [length].
+        """
+        ...
+
+    def temperature_table(self, points: Array) -> Array:
+        """Values of the temperature's element at reference points, shape (n_points, n_values)."""
+        ...
 
 
 class Bodies(Protocol):
@@ -37,6 +68,14 @@ class Bodies(Protocol):
     loads: list[Any]
     finite: bool
     uncovered: str
+
+    def cells_around(self, groups: list[str | None]) -> CellsAround:
+        """The cells; collective.
+
+        Args:
+            groups: Cell groups whose cells are marked; ``None`` stands for the whole mesh.
+        """
+        ...
 
     def displacements(self, nodes: Ints, state: State) -> Array:
         """Displacements of global nodes, the same on all ranks; collective.

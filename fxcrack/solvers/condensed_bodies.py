@@ -15,6 +15,7 @@ from fxcrack.continuum.thermal_strain import ThermalLoad
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.base import Solver
+from fxcrack.solvers.cell_source import CellSource
 
 
 class CondensedBodies:
@@ -47,6 +48,10 @@ class CondensedBodies:
         if any(isinstance(term, FollowerPressure) for term in forms.terms):
             return "pressures that follow the bodies"
         return ""
+
+    def cells_around(self, groups: list[str | None]) -> CellSource:
+        """The cells, with marks of those of some groups; collective."""
+        return CellSource(self.continuum, groups)
 
     def displacements(self, nodes: Ints, state: Equilibrium) -> Array:
         """Displacements of global nodes, the same on all ranks; collective."""
