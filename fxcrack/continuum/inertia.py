@@ -467,10 +467,9 @@ class InertiaForces(Term):
 
 def _densities(effect: Inertia, material: Any) -> Any:
     """Density of a part as :meth:`fxcrack.continuum.continuum.Continuum.mass_density` takes it."""
+    density: Any
     if isinstance(material, Section):
         density = material.mass(effect.density)
-        if density is not None:
-            return density
     else:
         density = getattr(material, "density", None) if effect.density is None else effect.density
     if density is None:
@@ -478,4 +477,4 @@ def _densities(effect: Inertia, material: Any) -> Any:
             f"Inertia: {material} has no density; give Inertia(density=...) or density= in the "
             "material"
         )
-    return PETSc.ScalarType(density)
+    return np.asarray(density, dtype=PETSc.ScalarType)
