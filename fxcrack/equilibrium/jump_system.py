@@ -276,6 +276,14 @@ class JumpSystem:
             out = self.schur[rows, : len(x)] @ x
         return np.asarray(out if self.offset is None else out + self.offset[rows])
 
+    def _products(self, rows: Ints, moved: Ints, jump: Array) -> Array:
+        """S at some rows times jumps, shape (n_retained,), that are zero but for some, (k,)."""
+        if len(rows) * len(moved) > max(AT_ONCE**2, self.schur.size // 8):
+            out = (self.schur[:, : len(jump)] @ jump)[rows]  # without a copy of so much of S
+        else:
+            out = self.schur[np.ix_(rows, moved)] @ jump[moved]
+        return np.asarray(out)
+
     def _response(self, loads: Array) -> Array:
         """Jumps of the free components under loads alone, shape (n_free,).
 
@@ -311,7 +319,7 @@ class JumpSystem:
         right = force[free]
         moved = np.flatnonzero(jump)
         if len(moved):
-            right = right - self.schur[np.ix_(free, moved)] @ jump[moved]
+            right = right - self._products(free, moved, jump)
         if np.any(right):
             part = part + self.cholesky.solve(right)
         jump[free] = part

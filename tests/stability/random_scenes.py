@@ -9,6 +9,7 @@ picks.
 from __future__ import annotations
 
 import argparse
+import json
 import signal
 import sys
 import time
@@ -80,8 +81,8 @@ def main() -> int:
             print(seed, c, bad, result.reason, flush=True)
         if given.log:
             with given.log.open("a") as stream:
-                n = len(result.history or ())
-                stream.write(f"{seed} {spent:.2f} {n} {c.kind} {bad} {result.reason}\n")
+                line = [seed, c.kind, result.worst.get("balance"), bad, round(spent, 2)]
+                stream.write(json.dumps([*line, result.reason]) + "\n")
         if "balance" in result.worst:
             rows[c.kind].append((result.worst["balance"], bool(bad)))
     print(f"{count} scenes, {refused} refused, {failed} failed, {time.monotonic() - begun:.0f} s")
