@@ -26,7 +26,9 @@ from fxcrack.continuum.temperature import Temperature, expansion_of
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.continuum.tied_elastic import TiedElastic
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.crack_pressure import CrackPressure
+from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.supports import Supports
 from fxcrack.solvers.plan import SOLVERS, Plan
 
 
@@ -136,6 +138,14 @@ def plan(
     for load in filter(_follows, loads):
         on.append(f"follower pressure '{load.title}'")
         why.append(f"pressure '{load.title}' follows the bodies")
+    for load in loads:
+        if isinstance(load, Pressure) and load.follows_crack:
+            on.append(f"pressure '{load.title}' on the faces of a crack as they open")
+            if finite:
+                raise InputError(
+                    f"pressure '{load.title}': follows_crack is for small strain; leave out "
+                    "FiniteStrain() and NeoHookean"
+                )
     if continuum.temperature is not None:
         if not any(
             hasattr(m, "temperatures") or expansion_of(m).any() for m in continuum.part_materials
@@ -188,12 +198,21 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     return terms
 
 
-def dead_loads(continuum: Continuum, loads: Sequence[Load], solver: str) -> list[Any]:
+def dead_loads(
+    continuum: Continuum,
+    loads: Sequence[Load],
+    solver: str,
+    pairs: Sequence[Pair],
+    supports: Supports,
+) -> list[Any]:
     """The loads that are force patterns: those that follow the bodies are terms instead.
 
     For the linear solver the temperature is a force pattern too.
     """
     out: list[Any] = [x for x in loads if not _follows(x)]
+    for i, load in enumerate(out):
+        if isinstance(load, Pressure) and load.follows_crack:
+            out[i] = CrackPressure.of(load, pairs, continuum, supports)
     if continuum.temperature is not None and solver == "linear":
         out += thermal_loads(continuum)
     return out

@@ -158,12 +158,16 @@ class Pressure:
     """Pressure on a named facet group, positive when it pushes into the body.
 
     Args:
-        where: Name of a facet group, or a face of a shell (:class:`fxcrack.Face`).
+        where: Name of a facet group, or a face of a shell (:class:`fxcrack.Face`); with
+            ``follows_crack`` the name of an interface, or of one of its two surfaces.
         value: Force/length^2, a number or a function of (undeformed) position.
         amplitude: Factor in time.
         name: What the history calls it.
         follows: Stay normal to the deformed facets and act on their deformed area, instead of
             keeping direction and size.
+        follows_crack: Act on both faces of an interface wherever it is open, also on what the crack
+            opens later on, as a fluid does that fills the crack at once. The conjugate displacement
+            ``v[..]`` in the history is the volume between the faces times ``value``.
     """
 
     where: str | Face
@@ -171,6 +175,7 @@ class Pressure:
     amplitude: AmplitudeLike = Ramp()
     name: str | None = None
     follows: bool = False
+    follows_crack: bool = False
 
     def __post_init__(self) -> None:
         """Check names and value."""
@@ -178,6 +183,14 @@ class Pressure:
         owner = f"load '{self.title}'"
         number_or_function(owner, "value", self.value)
         keep(self, follows=flag(owner, "follows", self.follows))
+        keep(self, follows_crack=flag(owner, "follows_crack", self.follows_crack))
+        if self.follows and self.follows_crack:
+            raise InputError(
+                f"{owner}: follows (deformed facets) and follows_crack (facets that open) exclude "
+                "each other; give one of them"
+            )
+        if self.follows_crack and isinstance(self.where, Face):
+            raise InputError(f"{owner}: follows_crack is not possible in shells; use solids")
 
     @property
     def title(self) -> str:

@@ -54,6 +54,7 @@ class ShellPart:
         axes: Axes of the section at the integration points, rows, shape (n_cells, n_points, 3, 3).
         area: Area each integration point stands for, of the rule of the bending energy (0 at
             points of another rule), shape (n_cells, n_points), length^2.
+        soft: The same of the rules of all other energy, weighted as they are.
         strain_cells: Strains, stiffness and energy of the cells; strains e0 and e1 per point.
     """
 
@@ -62,6 +63,7 @@ class ShellPart:
     nodes: Ints
     axes: Array
     area: Array
+    soft: Array
     strain_cells: StrainCells
 
 
@@ -98,9 +100,7 @@ class ShellBodies(Continuum):
         order: int | None = None,
         temperature: Temperature | None = None,
     ) -> None:
-        if temperature is not None:
-            raise InputError("Temperature is not possible in shells; model the part with solids")
-        super().__init__(mesh, materials, model, order=order)
+        super().__init__(mesh, materials, model, order=order, temperature=temperature)
         self.shell = model
         kind = mesh.domain.topology.cell_name()
         if kind == "triangle" and self.order == 2:
@@ -200,7 +200,7 @@ class ShellBodies(Continuum):
         if self.shell.enhanced_membrane and nodes.shape[1] == 4:
             enhanced.append(self._membrane_modes(x, sign, section, jacobian))
         return ShellPart(
-            section, np.asarray(cells, dtype=np.int64), nodes, axes, weight * rule,
+            section, np.asarray(cells, dtype=np.int64), nodes, axes, weight * rule, soft,
             StrainCells(vectors, element.matrices, local, np.concatenate(enhanced, -1), moduli),
         )  # fmt: skip
 

@@ -459,6 +459,8 @@ class _Writer:
         if title != load.where and self.mesh is not None:
             self.sets += self._surface(title, self.mesh.groups[_group(load.where)][1])
         if isinstance(load, Pressure):
+            if load.follows_crack:
+                refuse(f"pressure '{title}' with follows_crack")
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
                 refuse(

@@ -83,6 +83,8 @@ def body_grid(analysis: Analysis, u: fem.Function, time: float) -> Grid:
     """This rank's cells with displacement, stress and von Mises stress; collective."""
     continuum = analysis.continuum
     if isinstance(continuum, ShellBodies):
+        if continuum.temperature is not None:
+            continuum.temperature.set(time)
         return shell_grid(continuum, u, finite=has_finite_bodies(analysis))
     stress = stress_function(analysis, u, time)
     equivalent = von_mises(continuum, stress)

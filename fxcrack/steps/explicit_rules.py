@@ -12,6 +12,7 @@ from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import Load, Pressure
 from fxcrack.criteria import VCCT
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.pairing import Interface
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit_release import law_of
@@ -62,6 +63,11 @@ def check_bodies(continuum: Continuum, loads: Sequence[Load]) -> None:
             "Dynamic step"
         )
     for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"Explicit: pressure '{load.title}' with follows_crack is not available in "
+                "explicit dynamics; use a Static or Dynamic step"
+            )
         if isinstance(load, Pressure) and load.follows:
             raise InputError(
                 f"Explicit: pressure '{load.title}' follows the bodies, which explicit dynamics "

@@ -14,6 +14,7 @@ import numpy as np
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
@@ -255,6 +256,12 @@ def _never(driver: StepDriver) -> str:
 
 # -- controlled opening ----------------------------------------------------------------------------
 
+
+def _fills(load: object) -> bool:
+    """Whether a load is a pressure that follows the crack."""
+    return isinstance(load, CrackPressure)
+
+
 SAME_OPENING = 1e-9
 """Openings that differ by less than this part of them are the same."""
 
@@ -265,7 +272,8 @@ class OpeningControl:
     Args:
         solver: The solver, with its monitors.
         cracks: Active cracks.
-        names: Name of a monitor, or of two of which the opening is the first less the second.
+        names: Name of a monitor, or of two of which the opening is the first less the second; or of
+            a pressure that follows the crack, whose volume is controlled.
 
     Attributes:
         name: What is controlled, in words.
@@ -280,12 +288,20 @@ class OpeningControl:
         self.name = " - ".join(names)
         self.opening = 0.0
         titles = [m.title for m in solver.monitors]
+        first = solver.n_loads - len(solver.loads)
+        volumes = {x.title: first + k for k, x in enumerate(solver.loads) if _fills(x)}
         self._weight = np.zeros(len(titles))
+        self._volume = np.zeros(solver.n_loads)
         self._preloaded = False
         for name, sign in zip(names, (1.0, -1.0), strict=False):
-            if name not in titles:
-                unknown_name("monitor", name, titles)
-            self._weight[titles.index(name)] += sign
+            if name in titles:
+                self._weight[titles.index(name)] += sign
+            elif name in volumes:
+                self._volume[volumes[name]] += sign
+            else:
+                unknown_name(
+                    "monitor or pressure that follows the crack", name, [*titles, *volumes]
+                )
         if solver.system.friction is not None:
             raise InputError(
                 "stepping='opening' moves the load back at each release, and faces with friction "
@@ -312,7 +328,7 @@ class OpeningControl:
     def excess(self, state: Equilibrium) -> float:
         """What the opening of a state has over that of the last onset, length."""
         values = self._solver.system.monitors(state)[: len(self._weight)]
-        return float(self._weight @ values) - self.opening
+        return float(self._weight @ values + self._volume @ state.conjugate) - self.opening
 
     def reach(self, state: Equilibrium) -> None:
         """Control the opening of a state from now on.
