@@ -19,10 +19,10 @@ from mpi4py import MPI
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStress
 from fxcrack.continuum.laminate import square_strain
-from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.shell_temperature import ShellTemperature

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
-    AmplitudeLike,
     BodyForce,
     Field,
     Load,
