@@ -266,7 +266,7 @@ class GrowingCholesky:
             return len(self.free)
         n, first = len(self.free), int(np.argmax(drop))
         keep = np.flatnonzero(~drop[first:]) + first
-        if len(keep) > max(AT_ONCE, first):
+        if n - first > max(AT_ONCE, first):
             self._factor_anew(first, self.free[keep])
             return first
         trailing = self._read(first, first, n)

@@ -29,6 +29,13 @@ FOUND = {
 }
 """Seeds of scenes that failed once, and of what."""
 
+OPEN = {
+    174: "other numbers of nodes change the energy by 3e-5: increments at finite strain are divided "
+    "where their energies are off by more than a bound, and faces are paired anew after each",
+    264: "other numbers of nodes change f of another tip than the growing one by 6e-4 on a path",
+}
+"""Seeds of scenes that fail, and of what."""
+
 
 def fails(seed: int) -> list[str]:
     return check(Combination.of(seed), seed)[1]
@@ -50,6 +57,13 @@ def test_scenes(seed: int) -> None:
 def test_scenes_that_failed_once(seed: int) -> None:
     c = Combination.of(seed)
     assert not faults(c, run_scene(c)), (c, FOUND[seed])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", OPEN)
+def test_scenes_that_fail(seed: int) -> None:
+    if bad := fails(seed):
+        pytest.xfail(f"{bad}: {OPEN[seed]}")
 
 
 @pytest.mark.slow
