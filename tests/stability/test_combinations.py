@@ -30,8 +30,8 @@ FOUND = {
 """Seeds of scenes that failed once, and of what."""
 
 OPEN = {
-    174: "other numbers of nodes change the energy by 3e-5: increments at finite strain are divided "
-    "where their energies are off by more than a bound, and faces are paired anew after each",
+    174: "other numbers of nodes change the energy by 3e-5: where the energies of an increment are off "
+    "by more than a bound it is divided, and after each faces are paired anew",
     264: "other numbers of nodes change f of another tip than the growing one by 6e-4 on a path",
 }
 """Seeds of scenes that fail, and of what."""
