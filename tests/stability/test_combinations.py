@@ -30,8 +30,8 @@ FOUND = {
 """Seeds of scenes that failed once, and of what."""
 
 OPEN = {
-    174: "other numbers of nodes change the energy by 3e-5: where the energies of an increment are off "
-    "by more than a bound it is divided, and after each faces are paired anew",
+    174: "other numbers of nodes change the energy by 3e-5: an increment is divided where its "
+    "energies are off by more than a bound, and after each faces are paired anew",
     264: "other numbers of nodes change f of another tip than the growing one by 6e-4 on a path",
 }
 """Seeds of scenes that fail, and of what."""
