@@ -19,6 +19,7 @@ from fxcrack.base.checks import (
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint, Coupling, Equation
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import (
     Axisymmetric,
@@ -70,7 +71,7 @@ class SceneInput:
     mesh: Mesh
     materials: Material | Section | Mapping[str, Material] | Mapping[str, Section]
     model: Model | Shell
-    supports: Sequence[Displacement | Support] = ()
+    supports: Sequence[Displacement | Support | Constraint] = ()
     loads: Sequence[Load] = ()
     debonds: Sequence[Debond] = ()
     bonds: Sequence[Interface] = ()
@@ -91,7 +92,7 @@ class SceneInput:
             (PlaneStrain, PlaneStress, Axisymmetric, Solid, Shell),
             "Solid()",
         )
-        self._take_list("supports", (Displacement, Clamp, Symmetry, Rotation))
+        self._take_list("supports", (Displacement, Clamp, Symmetry, Rotation, Coupling, Equation))
         self._take_list("loads", (Traction, Pressure, BodyForce, PointForce, Moment, PointMoment))
         check_amplitudes([*self.supports, *self.loads])
         warn_of_same_titles("loads", self.loads)
@@ -186,7 +187,7 @@ def compose(given: SceneInput) -> Analysis:
     ]
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
-    loads = dead_loads(continuum, given.loads, chosen.solver)
+    loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
     parts = continuum, pairs, supports, loads, list(given.monitors)
     solver: Solver
     if chosen.solver == "linear":

@@ -13,8 +13,10 @@ from fxcrack.base.checks import is_function, list_of
 from fxcrack.base.errors import InputError
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
+from fxcrack.effects import is_finite
 from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
+from fxcrack.interface.set_motions import warn_of_turns
 from fxcrack.interface.supports import warn_of_held_bonds
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
@@ -138,6 +140,11 @@ def run_step(
         analysis, step, restarts, progress=progress, observers=observers
     )
     analysis.history.details = _details(analysis)
+    constraints = analysis.solver.supports.constraints
+    if constraints and is_finite(analysis.continuum, analysis.effects):
+        u = analysis.solver.displacement()
+        warn_of_turns(analysis.continuum, constraints, u.array_r.copy())
+        u.destroy()
     return first
 
 

@@ -39,10 +39,9 @@ def beam(
     given: dict[str, Any] = {} if "release" not in options else {"release": options.pop("release")}
     return fx.Scene(
         mesh or dcb_2d(comm, length=80.0, height=1.5, dx=0.5, ny=3),
-        materials=ALUMINIUM,
         model=fx.PlaneStrain(thickness=20.0),
         debonds=[fx.Debond(interface, criterion or fx.VCCT(GIc=G_IC), **given)],
-        **{"effects": [fx.Inertia()], "supports": pins(speed), **options},
+        **{"materials": ALUMINIUM, "effects": [fx.Inertia()], "supports": pins(speed), **options},
     )
 
 
@@ -114,7 +113,8 @@ def test_non_matching_faces_spend_the_toughness(comm: MPI.Intracomm) -> None:
     assert imbalance(history) <= 1e-10
     # bonds that share masters are solved in sweeps, of which stiff ones need more than there are
     assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=2e-6)
-    assert np.all(history["tie_energy"][1:] >= 0.0)
+    # kinetic energies are subtracted, so what is none is round-off of either sign
+    assert np.all(history["tie_energy"] >= -1e-12 * history["external_work"][-1])
     assert history["tie_energy"][-1] <= 1e-3 * history["external_work"][-1]
 
 

@@ -69,7 +69,10 @@ def check_held(continuum: Continuum, supports: Supports) -> None:
     Raises:
         SolverError: It can.
     """
-    held = rigid_motions(continuum)[supports.which >= 0]
+    motions = rigid_motions(continuum)
+    held = motions[supports.which >= 0]
+    if supports.following is not None:
+        held = np.concatenate([held, supports.following.residual(continuum.layout, motions)])
     triangles = continuum.comm.allgather(np.linalg.qr(held, mode="r"))
     none = np.zeros((held.shape[1],) * 2)
     _, seen, vectors = np.linalg.svd(np.vstack([none, *triangles]), full_matrices=False)

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Pressure, Traction
 from fxcrack.criteria.crack_tip_fields import TipFields
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import FacetSurface, gather_surface, shape_functions
 
@@ -32,7 +34,17 @@ class LoadedFaces:
 
 
 def loads_on_faces(continuum: Continuum, loads: list[Any]) -> list[LoadedFaces]:
-    """The tractions and pressures among some loads, with their facets; collective."""
+    """The tractions and pressures among some loads, with their facets; collective.
+
+    Raises:
+        InputError: One of them is a pressure that follows the crack.
+    """
+    for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"method='domain' does not know pressures that follow the crack (pressure "
+                f"'{load.title}'); use method='vcct' or 'closure'"
+            )
     return [
         LoadedFaces(k, load, gather_surface(continuum, load.where))
         for k, load in enumerate(loads)

@@ -18,11 +18,12 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
 from fxcrack.continuum.loads import (
-    AmplitudeLike,
     BodyForce,
     Displacement,
     Load,
@@ -31,7 +32,6 @@ from fxcrack.continuum.loads import (
     PointForce,
     PointMoment,
     Pressure,
-    Ramp,
     Traction,
 )
 from fxcrack.continuum.temperature import Temperature
@@ -380,9 +380,14 @@ class _Writer:
     def _amplitudes(self) -> list[str]:
         out = []
         for amplitude, name in self.amplitudes.items():
-            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME')
-            times = [0.0, self.end] if isinstance(amplitude, Ramp) else list(amplitude.times)
-            values = times if isinstance(amplitude, Ramp) else list(amplitude.values)
+            smooth = isinstance(amplitude, SmoothStep)
+            kind = ", DEFINITION=SMOOTH STEP" if smooth else ""
+            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME{kind}')
+            if isinstance(amplitude, Amplitude | SmoothStep):
+                times, values = list(amplitude.times), list(amplitude.values)
+            else:
+                times = sorted({0.0, *amplitude.breaks(), self.end})
+                values = [amplitude(t) for t in times]
             if times[0] > 0.0:
                 times, values = [0.0, *times], [values[0], *values]
             words = [number(x) for pair in zip(times, values, strict=True) for x in pair]
@@ -401,6 +406,8 @@ class _Writer:
     def _supports(self) -> list[str]:
         cards: list[str] = []
         for support in self.scene.input.supports:
+            if isinstance(support, Coupling | Equation):
+                refuse(f"the constraint {type(support).__name__}('{support.title}')")
             self._name_nodes(support.title, support.where)
             cards += self._support(support)
         return cards
@@ -456,6 +463,8 @@ class _Writer:
         if title != load.where and self.mesh is not None:
             self.sets += self._surface(title, self.mesh.groups[_group(load.where)][1])
         if isinstance(load, Pressure):
+            if load.follows_crack:
+                refuse(f"pressure '{title}' with follows_crack")
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
                 refuse(

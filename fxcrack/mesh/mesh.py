@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.mesh
@@ -38,11 +38,15 @@ class Mesh:
         domain: The DOLFINx mesh.
         groups: Named groups, the same names on every rank.
         name: What messages and files call the mesh.
+        joints: Nodes of a surface mesh at which smooth parts with nodes of their own meet (kinks, T
+            joints): number of the node in the input (``geometry.input_global_indices``), and
+            number of its joint, sorted by it, the same on every rank, shape (n_nodes, 2).
     """
 
     domain: dolfinx.mesh.Mesh
     groups: dict[str, Group]
     name: str = "mesh"
+    joints: npt.NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 2), np.int64))
 
     def __repr__(self) -> str:
         """Name, dimension, order and groups."""

@@ -18,7 +18,7 @@ overlap afterwards are all open pairs looked at (:meth:`InterfaceDynamics._gener
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,7 +28,15 @@ from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
-from fxcrack.solvers.explicit_softening import SWEEPS, LiveBonds, settled
+from fxcrack.solvers.explicit_faces import (
+    SWEEPS,
+    FaceForces,
+    OpenFaces,
+    find_forces,
+    total_forces,
+    without_gain,
+)
+from fxcrack.solvers.explicit_softening import LiveBonds
 
 
 @dataclass
@@ -119,6 +127,7 @@ class InterfaceDynamics:
         self._fixed_column = lumped.which.ravel()[self._fixed]
         self._fixed_value = lumped.value.ravel()[self._fixed]
         self._h = self._dt = 1.0
+        self._warned_of_sweeps = False
         self._acting = _Acting()
         self.set_ties(tied)
 
@@ -198,12 +207,14 @@ class InterfaceDynamics:
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
         self._may_touch = np.flatnonzero(may_touch)
         self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
-        self._gap = lumped.gap[rows] if np.any(lumped.gap[rows]) else None
+        self._has_gap = bool(np.any(lumped.gap[rows]))
         self._closing_gap = lumped.gap[rows[self._may_touch]]
         self._gaps = np.zeros(len(self._may_touch))
-        self._mu = self._friction[rows]
-        self._rough = bool(self._mu.any())
-        self._warned_of_sweeps = False
+        self._faces = OpenFaces(
+            self._normal, lumped.gap[rows] if self._has_gap else None, self._may_touch,
+            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.simple,
+        )  # fmt: skip
+        self._last_found: FaceForces | None = None
         self._soften()
 
     def _soften(self) -> None:
@@ -303,7 +314,7 @@ class InterfaceDynamics:
         if not len(self._may_touch):
             return False
         gaps = self._closing.into(x, self._gaps)
-        if self._gap is not None:
+        if self._has_gap:
             gaps += self._closing_gap
         return bool(gaps.min() < 0.0)
 
@@ -351,128 +362,51 @@ class InterfaceDynamics:
             free: Jumps at the end without these forces, shape (n_open, gdim), length.
             hh: dt h.
         """
-        soft, live, lumped = self._soft, self._live, self.lumped
-        strength = np.zeros(len(soft))
-        pressure = np.zeros(len(free))
-        holding: Array | None = None
+        soft, live, faces = self._soft, self._live, self._faces
         gap = self.gap
-        here = (gap[soft] * live.direction).sum(axis=1)
-        touch = self._may_touch[:0]
-        forces: Array | None = None
-        for sweep in range(SWEEPS):
-            there = free
-            if sweep and forces is not None:
-                there = free + hh * lumped.response(forces)
-            before, pressed, held = strength, pressure, holding
-            after = there
-            if len(soft):
-                own = hh * live.coupling.diagonal()
-                opening = (there[soft] * live.direction).sum(axis=1) + own * strength
-                strength = live.alone(here, opening, hh)
-                # what this changes at once at its own place; the rest follows in the next sweep
-                after = there.copy()
-                pull = (before - strength)[:, None] * live.direction
-                after[soft] += hh * lumped.compliance[soft] * pull
-            pressure, touch = self._pressures(after, pressure, hh)
-            if not len(soft) and not len(touch):
-                return None
-            forces = pressure[:, None] * self._normal
-            forces[soft] -= strength[:, None] * live.direction
-            rough = self._rough and bool(len(touch))
-            if rough:
-                moved = after + hh * lumped.compliance * (
-                    (pressure - pressed)[:, None] * self._normal
-                )
-                holding = self._sticking(moved - gap, holding, touch, pressure, hh)
-                forces += holding
-            elif holding is not None:
-                holding = np.zeros_like(holding)
-            if lumped.simple and not (len(soft) and pressure[soft].any()):
-                break  # every pair moves by itself, and softens or touches
-            if sweep and settled(strength, before) and settled(pressure, pressed):
-                if holding is None or held is None or settled(holding, held):
-                    break
-        else:
-            self._warn_of_sweeps()
-        assert forces is not None
+        found = find_forces(faces, live, soft, gap, free, hh, self._last_found)
+        if not faces.separate:
+            self._last_found = found
+        if not len(soft) and not len(found.touch):
+            return None
+        if not found.settled:
+            self._calm(found, gap, free)
         if len(soft):
-            acting.softening = strength
+            acting.softening = found.strength
+        touch = found.touch
         if len(touch):
-            acting.contact = touch, pressure[touch, None] * self._normal[touch]
-            if holding is not None:
-                acting.friction = touch, holding[touch]
-        return forces
+            acting.contact = touch, found.pressure[touch, None] * self._normal[touch]
+            if faces.rough:
+                acting.friction = touch, found.holding[touch]
+        return total_forces(faces, live, soft, found.strength, found.pressure, found.holding)
 
-    def _warn_of_sweeps(self) -> None:
-        """Say once that contact, friction and softening did not come to agree."""
+    def _calm(self, found: FaceForces, gap: Array, free: Array) -> None:
+        """Take of forces that do not agree a part that adds no energy, and say so once."""
+        faces, live, soft = self._faces, self._live, self._soft
+        none = np.zeros_like(found.pressure)
+        pulled = total_forces(faces, live, soft, found.strength, none, 0.0 * found.holding)
+        after = (free - gap) / self._dt + self._h * faces.response(pulled)
+        between = found.pressure[:, None] * faces.normal + found.holding
+        before = self.lumped.jumps(self.v)
+        part = without_gain(faces, between, before, after, self._h)
+        found.pressure, found.holding = part * found.pressure, part * found.holding
         if not self._warned_of_sweeps:
             self._warned_of_sweeps = True
             log.warn(
                 "explicit dynamics: forces between faces that touch did not settle in %d sweeps of "
-                "an increment; make the finer side the master, or give both sides the same mesh",
+                "an increment; of these forces the part is taken that adds no energy, %.3g",
                 SWEEPS,
+                part,
             )
-
-    def _pressures(self, jumps: Array, pressure: Array, hh: float) -> tuple[Array, Ints]:
-        """Contact forces for which touching pairs end at zero distance, and where there are any.
-
-        Args:
-            jumps: At the end of the increment with the present forces, shape (n_open, gdim).
-            pressure: Those forces, shape (n_open,), force.
-            hh: dt h.
-
-        Returns:
-            Pressures, shape (n_open,), and rows, shape (m,).
-        """
-        may = self._may_touch
-        if not len(may):
-            return pressure, may
-        gaps = self._normal_gaps(jumps)[may]
-        new = np.maximum(pressure[may] - gaps / (hh * self._compliance[may]), 0.0)
-        out = np.zeros(len(pressure))
-        out[may] = new
-        return out, may[new > 0.0]
-
-    def _normal_gaps(self, jumps: Array) -> Array:
-        gaps = (jumps * self._normal).sum(axis=1)
-        return np.asarray(gaps if self._gap is None else gaps + self._gap)
-
-    def _sticking(
-        self, moved: Array, before: Array | None, touch: Ints, pressure: Array, hh: float
-    ) -> Array:
-        """Friction of the touching pairs, shape (n_open, gdim), force.
-
-        Args:
-            moved: Change of the jumps over the increment with the present forces, those of friction
-                among them, shape (n_open, gdim), length.
-            before: The present forces of friction, same shape; ``None``: none.
-            touch: Rows that touch, shape (m,).
-            pressure: Of all open rows, shape (n_open,), force.
-            hh: dt h.
-        """
-        out = np.zeros_like(moved)
-        rough = touch[self._mu[touch] > 0.0]
-        if not len(rough):
-            return out
-        moved, n = moved[rough], self._normal[rough]
-        slide = moved - (moved * n).sum(axis=1)[:, None] * n
-        # masses that differ by component: the lightest one decides
-        holding = -slide / (hh * self.lumped.compliance[rough].max(axis=1))[:, None]
-        if before is not None:
-            holding += before[rough]
-        size = np.linalg.norm(holding, axis=1)
-        limit = self._mu[rough] * pressure[rough]
-        holding *= np.divide(limit, size, out=np.ones_like(size), where=size > limit)[:, None]
-        out[rough] = holding
-        return out
 
     def _by_penalty(self, acting: _Acting, free: Array, hh: float) -> Array | None:
         """Softening forces, and contact by a stiffness on present overlaps."""
         assert self.penalty is not None
-        may, self._may_touch = self._may_touch, self._may_touch[:0]
+        faces, may = self._faces, self._may_touch
+        self._faces = replace(faces, may_touch=may[:0])
         forces = self._by_multipliers(acting, free, hh)
-        self._may_touch = may
-        overlap = np.minimum(self._normal_gaps(self.gap)[may], 0.0)
+        self._faces = faces
+        overlap = np.minimum(faces.normal_gaps(self.gap)[may], 0.0)
         touch, overlap = may[overlap < 0.0], overlap[overlap < 0.0]
         if not len(touch):
             return forces
@@ -551,7 +485,7 @@ class InterfaceDynamics:
         chosen = np.flatnonzero(rows[self.lumped.open])
         if not len(chosen):
             return 0.0, -1
-        gaps = self._normal_gaps(self.gap)[chosen]
+        gaps = self._faces.normal_gaps(self.gap)[chosen]
         i = int(np.argmin(gaps))
         return float(gaps[i]), int(self.lumped.open[chosen[i]])
 

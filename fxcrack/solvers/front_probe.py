@@ -11,6 +11,7 @@ from scipy.linalg import cho_solve
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.base import Solver
@@ -54,7 +55,19 @@ class CondensedFrontProbe:
         rows = np.unique(index[index >= 0])
         values = np.zeros(solver.system.n_retained)
         values[rows] = -solver.system.forces(state, rows)
-        return solver.vectors(self._p, nodes, values)
+        return solver.vectors(self._p, nodes, values) - self._under_bonds(nodes, state)
+
+    def _under_bonds(self, nodes: Ints, state: Equilibrium) -> Array | float:
+        """What pressures that follow the crack add to the forces of bonds, shape (..., 3)."""
+        solver = self._solver
+        total: Array | float = 0.0
+        first = solver.n_loads - len(solver.loads)
+        for k, load in enumerate(solver.loads):
+            if isinstance(load, CrackPressure) and load.p == self._p and state.loads[first + k]:
+                each = np.zeros((self.front.surface.n_nodes, 3))
+                each[:, : self.gdim] = load.under_bonds(self.front.bonded)
+                total = total + float(state.loads[first + k]) * each[nodes]
+        return total
 
     def round_off(self, nodes: Ints, state: Equilibrium) -> Array:
         """How large bond forces may be by round-off alone, shape (...) [force]."""
@@ -82,7 +95,8 @@ class CondensedFrontProbe:
         """Loads on the faces, global vectors of shape (..., 3) [force]."""
         solver = self._solver
         factors = state.loads[solver.n_loads - len(solver.loads) :]
-        return solver.vectors(self._p, nodes, solver.face_loads @ factors)
+        every = solver.vectors(self._p, nodes, solver.face_loads @ factors)
+        return every - self._under_bonds(nodes, state)
 
     def released_jumps(self, nodes: Ints, force: Array, normal: Array | None = None) -> Array:
         """Jumps that releasing some nodes would open, global vectors of shape (k, 3) [length]."""

@@ -56,6 +56,7 @@ class StepDriver:
         path: The way along the load.
         breaks: Times at which an amplitude changes its slope.
         end_time: Time at which the step ends; :data:`LARGE` if it has none.
+        preloaded: Whether constant loads act beside the one that the step moves forth and back.
 
     Raises:
         InputError: The bodies and the stepping are not compatible.
@@ -77,6 +78,7 @@ class StepDriver:
         self.breaks = analysis.load_breaks()
         self.end_time = min([u.time for u in step.ends if isinstance(u, Time)], default=LARGE)
         self.record = Recorder(analysis, observer, columns)
+        self.preloaded = False
         self._checkpoint_point = checkpoint_point
         solver = analysis.solver
         self.path: LoadPath

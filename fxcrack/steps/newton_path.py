@@ -209,24 +209,29 @@ class NewtonLoadPath:
             if abs(after - 1.0) < _NEAR_ONE and abs(after - 1.0) > 0.5 * abs(level - 1.0):
                 return  # nearer than the iteration can resolve
 
-    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+    def back_to(
+        self, excess: Callable[[Equilibrium], float], tolerance: float, floor: float = 0.0
+    ) -> bool:
         """See :meth:`fxcrack.steps.load_path.LoadPath.back_to`.
 
         Raises:
             TooManyCutbacks: No equilibrium was found.
         """
-        whole, size = self._analysis.time, self._maximum
-        above, below = whole, None  # times at which the quantity is positive and negative
+        whole, size = self._analysis.time - floor, self._maximum
+        above, below = (
+            self._analysis.time,
+            None,
+        )  # times at which the quantity is positive and negative
         bracket: Bracket | None = None
         for _ in range(_MOST + int(min(whole / size, 1e4))):
             begin, value = self._analysis.time, excess(self._solver.state)
             self._analysis.evaluate_tips()
             if abs(value) <= tolerance:
                 return True
-            if value > 0.0 and begin <= 0.0:
+            if value > 0.0 and begin <= floor:
                 return False
             if value > 0.0:
-                above, end = begin, max(begin - size, 0.0)
+                above, end = begin, max(begin - size, floor)
             else:
                 below, end = begin, above
             guess = self._zero(excess, value, end)
