@@ -79,7 +79,8 @@ class CondensedFrontProbe:
         error = np.minimum(system.cholesky.round_off, most)
         each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
         if not each.any() and system.n_retained:
-            each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
+            rows = np.unique(index[index >= 0])
+            each[rows] = _OF_PRODUCTS * (np.abs(system.schur[rows, : len(x)]) @ x)
         return np.asarray(each[np.where(index >= 0, index, -1)].max(axis=-1))
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
