@@ -13,6 +13,7 @@ from typing import Any
 
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.conserving import conserving
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
@@ -88,10 +89,8 @@ def _follows(load: Load) -> bool:
     return isinstance(load, Pressure) and load.follows
 
 
-def _check_shells(effects: Sequence[Any], loads: Sequence[Load]) -> None:
+def _check_shells(loads: Sequence[Load]) -> None:
     """Refuse what shells cannot have."""
-    if any(isinstance(e, Inertia) for e in effects):
-        raise InputError("Inertia is not possible in shells; use ContinuumShell or solids")
     for load in filter(_follows, loads):
         raise InputError(
             f"pressure '{load.title}': a pressure on a shell keeps its direction; leave out follows"
@@ -121,7 +120,7 @@ def plan(
     forms = _forms(continuum)
     finite = _is_finite(forms, effects)
     if isinstance(continuum, ShellBodies):
-        _check_shells(effects, loads)
+        _check_shells(loads)
     if finite and "plastic" in forms:
         raise InputError(
             "Plastic is a law for small strain and cannot stand beside finite strain; leave out "
@@ -194,7 +193,8 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     terms += [
         FollowerPressure(continuum, x) for x in loads if isinstance(x, Pressure) and x.follows
     ]
-    terms += [InertiaForces(continuum, e) for e in effects if isinstance(e, Inertia)]
+    for effect in (e for e in effects if isinstance(e, Inertia)):
+        terms = [*conserving(continuum, terms, effect), InertiaForces(continuum, effect)]
     return terms
 
 

@@ -117,13 +117,19 @@ class Section:
         a, b, d = self.laminate.moments(2, self.offset) * np.outer(factor, factor)
         return np.block([[a, b], [b, d]])
 
-    def mass(self) -> Array | None:
+    def mass(self, density: float | None = None) -> Array | None:
         """Moments of the density, int rho (1, z, z^2) dz.
 
-        Shape (3,); ``None`` where a density is missing.
+        Args:
+            density: Of all plies, mass/volume; their own by default.
+
+        Returns:
+            Shape (3,), mass/length^2 and what follows; ``None`` where a density is missing.
         """
-        plies = self.laminate.plies
-        densities = [getattr(p.material, "density", None) for p in plies]
+        densities = [
+            density if density is not None else getattr(p.material, "density", None)
+            for p in self.laminate.plies
+        ]
         if any(d is None for d in densities):
             return None
         rho = np.array(densities, dtype=float)

@@ -271,6 +271,15 @@ class ShellBodies(Continuum):
         out.x.array.reshape(-1, 6)[:, 3:] = self.directors
         return out
 
+    def mass_density(self, density: Any, a: Any, v: Any) -> Any:
+        """Virtual work of the inertia per area, int rho (a + z a_w) . (v + z v_w) dz; UFL."""
+        on_u, on_w = (ufl.as_vector([a[i + k] for i in range(3)]) for k in (0, 3))
+        u, w = (ufl.as_vector([v[i + k] for i in range(3)]) for k in (0, 3))
+        mixed = ufl.inner(on_u, w) + ufl.inner(on_w, u)
+        return (
+            density[0] * ufl.inner(on_u, u) + density[1] * mixed + density[2] * ufl.inner(on_w, w)
+        )
+
     def change_of_director(self, q: Any) -> Any:
         """UFL change of the director among the unknowns."""
         return ufl.as_vector([q[i] for i in range(3, 6)])

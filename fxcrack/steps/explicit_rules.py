@@ -10,6 +10,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.criteria import VCCT
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.pairing import Interface
@@ -45,6 +46,11 @@ def check_bodies(continuum: Continuum, loads: Sequence[Any]) -> None:
     Raises:
         InputError: Says which, and what to do instead.
     """
+    if isinstance(continuum, ShellBodies):
+        raise InputError(
+            "Explicit: shells on surface meshes have no lumped masses for explicit dynamics; use a "
+            "Dynamic step, or ContinuumShell on hexahedra of first order"
+        )
     if continuum.order != 1:
         raise InputError(
             "Explicit needs first-order elements: row sums of second-order ones give corner nodes "
