@@ -567,6 +567,15 @@ class NewtonSolver(InterfaceSolver):
         out.axpy(1.0, self.u)
         return out
 
+    def displacement_of_jumps(self, jump: Array) -> PETSc.Vec:
+        """Change of displacement by a change of retained jumps, shape (n_retained,); collective.
+
+        By the tangent, loads as they are; the caller destroys it.
+        """
+        last = np.zeros(self.tangent.coordinates.n_last)
+        last[: self.system.n_retained] = jump
+        return self.tangent.condensation.displacement(last)
+
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them."""
         return self.tangent.out_of_balance((self.state if state is None else state).loads)
