@@ -10,10 +10,11 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.checks import is_function, list_of
-from fxcrack.base.errors import InputError
+from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.effects import is_finite
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.set_motions import warn_of_turns
@@ -61,6 +62,11 @@ def check_step(
             )
     check_criteria(step, chosen)
     if isinstance(step, Explicit):
+        if analysis.stabilise is not None:
+            raise InputError(
+                "Explicit: stabilise is for equilibria; bodies in explicit dynamics need no "
+                "supports, so leave it out"
+            )
         return
     effects, why = analysis.effects, analysis.plan.why
     if isinstance(analysis.solver, ExplicitSolver):
@@ -134,11 +140,17 @@ def run_step(
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
     check_same_call(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
     restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
-    _prepare(analysis, restarts, may_grow, step)
+    try:
+        _prepare(analysis, restarts, may_grow, step)
+    except NotPositiveDefinite as error:
+        raise SolverError(held_by_contact(error.why)) from error
     first = len(analysis.history)
-    analysis.history.reason = restarts.finished or _drive(
-        analysis, step, restarts, progress=progress, observers=observers
-    )
+    try:
+        analysis.history.reason = restarts.finished or _drive(
+            analysis, step, restarts, progress=progress, observers=observers
+        )
+    except NotPositiveDefinite as error:
+        raise SolverError(held_by_contact(error.why)) from error
     analysis.history.details = _details(analysis)
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
@@ -146,6 +158,20 @@ def run_step(
         warn_of_turns(analysis.continuum, constraints, u.array_r.copy())
         u.destroy()
     return first
+
+
+def held_by_contact(why: str) -> str:
+    """What to do about bodies that only contact could hold.
+
+    Args:
+        why: Which body can move, and how, as far as it is known.
+    """
+    return (
+        "there is no equilibrium: open faces would have to hold a body that nothing presses "
+        f"against them yet{f' ({why})' if why else ''}. Hold it by supports, prescribe its "
+        "displacement until it touches, or let a weak foundation hold it: Scene(..., "
+        "stabilise={'name of its cell group': 1e-6})"
+    )
 
 
 def _prepare(

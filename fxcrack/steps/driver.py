@@ -105,7 +105,8 @@ class StepDriver:
         try:
             reason = stepping(self)
         except (NotPositiveDefinite, ComesApart) as error:
-            reason = _separated(error)
+            tips = any(len(v.tips) for v in analysis.tip_values)
+            reason = _separated(error, releasing=tips)
         except (TooManyCutbacks, ConvergenceError, EnergyImbalance) as error:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
@@ -202,14 +203,18 @@ def _seconds_of_factorisations(timings: Timings) -> float:
     return sum(v for k, v in timings.seconds.items() if k.startswith("factor"))
 
 
-def _separated(error: NotPositiveDefinite | ComesApart) -> str:
+def _separated(error: NotPositiveDefinite | ComesApart, *, releasing: bool) -> str:
     what = (
         "the load exceeds what is left of the interface"
         if isinstance(error, ComesApart)
         else "releasing the next node would leave a body unsupported"
     )
+    if isinstance(error, NotPositiveDefinite) and not releasing:
+        what = "faces part whose contact alone held a body, which stabilise= of the scene may hold"
     if isinstance(error, NotPositiveDefinite) and error.why == HELD_BY_ROUND_OFF:
         what = f"releasing the next node, {error.why}"
+    elif isinstance(error, NotPositiveDefinite) and error.why:
+        what += f" ({error.why})"
     reason = f"total separation: {what}; the step ends in the last equilibrium before it"
     log.warn("%s", reason)
     return reason
