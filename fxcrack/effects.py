@@ -88,10 +88,8 @@ def _follows(load: Load) -> bool:
     return isinstance(load, Pressure) and load.follows
 
 
-def _check_shells(effects: Sequence[Any], loads: Sequence[Load]) -> None:
+def _check_shells(loads: Sequence[Load]) -> None:
     """Refuse what shells cannot have."""
-    if any(isinstance(e, Inertia) for e in effects):
-        raise InputError("Inertia is not possible in shells; use ContinuumShell or solids")
     for load in filter(_follows, loads):
         raise InputError(
             f"pressure '{load.title}': a pressure on a shell keeps its direction; leave out follows"
@@ -121,7 +119,7 @@ def plan(
     forms = _forms(continuum)
     finite = _is_finite(forms, effects)
     if isinstance(continuum, ShellBodies):
-        _check_shells(effects, loads)
+        _check_shells(loads)
     if finite and "plastic" in forms:
         raise InputError(
             "Plastic is a law for small strain and cannot stand beside finite strain; leave out "
