@@ -413,7 +413,9 @@ def check_slaves(
                 raise InterfaceError(
                     f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
                     f"'{seen[dof]}' and of '{pair.title}'; a node can be a slave only once: "
-                    "let the surfaces end before each other or exchange slave and master of one"
+                    "where surfaces meet at an angle, exchange slave and master of one; those that "
+                    "continue each other are one interface: mesh.joined('whole', ['first', "
+                    "'second']) for either side, with toughness and friction by position"
                 )
             seen[dof] = pair.title
         slave = nodes.find(pair.surface.dofs)
