@@ -26,6 +26,7 @@ from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond
+from fxcrack.steps.driver import held_by_contact
 from fxcrack.steps.end_conditions import CrackLength, Time
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_driver import run_explicit
@@ -164,20 +165,6 @@ def run_step(
         warn_of_turns(analysis.continuum, constraints, u.array_r.copy())
         u.destroy()
     return first
-
-
-def held_by_contact(why: str) -> str:
-    """What to do about bodies that only contact could hold.
-
-    Args:
-        why: Which body can move, and how, as far as it is known.
-    """
-    return (
-        "there is no equilibrium: open faces would have to hold a body that nothing presses "
-        f"against them yet{f' ({why})' if why else ''}. Hold it by supports, prescribe its "
-        "displacement until it touches, or let a weak foundation hold it: Scene(..., "
-        "stabilise={'name of its cell group': 1e-6})"
-    )
 
 
 def _prepare(
