@@ -9,6 +9,7 @@ from fxcrack.base.errors import EnergyError, FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.amplitudes import Amplitude, Integral, Ramp, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
@@ -16,7 +17,6 @@ from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
-    Amplitude,
     BodyForce,
     Displacement,
     Moment,
@@ -24,7 +24,6 @@ from fxcrack.continuum.loads import (
     PointForce,
     PointMoment,
     Pressure,
-    Ramp,
     Traction,
     constant,
 )
@@ -161,6 +160,7 @@ __all__ = [
     "History",
     "Inertia",
     "InputError",
+    "Integral",
     "Interface",
     "Interrupted",
     "Isotropic",
@@ -193,6 +193,7 @@ __all__ = [
     "Scene",
     "Section",
     "Shell",
+    "SmoothStep",
     "Solid",
     "Split",
     "Static",

@@ -45,7 +45,7 @@ from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_interfaces, warn_of_step_release
+from fxcrack.steps.explicit_rules import check_interfaces, check_start, warn_of_step_release
 from fxcrack.steps.explicit_setup import start_from, use_explicit_solver
 from fxcrack.steps.rows import Observer
 from fxcrack.steps.static import Static
@@ -301,9 +301,9 @@ class Scene:
         check_interfaces(chosen, given.bonds)
         others = [e for e in given.effects if not isinstance(e, Inertia)]
         begins = not isinstance(self.solver, ExplicitSolver)
-        use_explicit_solver(
-            self.analysis, given.loads, lambda c: form_terms(c, others, given.loads)
-        )
+        if begins and step.start == "equilibrium":
+            check_start(self.continuum, given.interfaces)
+        use_explicit_solver(self.analysis, lambda c: form_terms(c, others, given.loads))
         warn_of_step_release(chosen)
         if begins and step.start == "equilibrium":
             still = self.rebuilt(effects=others)

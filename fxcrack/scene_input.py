@@ -187,7 +187,7 @@ def compose(given: SceneInput) -> Analysis:
     ]
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
-    loads = dead_loads(continuum, given.loads, chosen.solver)
+    loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
     parts = continuum, pairs, supports, loads, list(given.monitors)
     solver: Solver
     if chosen.solver == "linear":

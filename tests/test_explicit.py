@@ -39,10 +39,9 @@ def beam(
     given: dict[str, Any] = {} if "release" not in options else {"release": options.pop("release")}
     return fx.Scene(
         mesh or dcb_2d(comm, length=80.0, height=1.5, dx=0.5, ny=3),
-        materials=ALUMINIUM,
         model=fx.PlaneStrain(thickness=20.0),
         debonds=[fx.Debond(interface, criterion or fx.VCCT(GIc=G_IC), **given)],
-        **{"effects": [fx.Inertia()], "supports": pins(speed), **options},
+        **{"materials": ALUMINIUM, "effects": [fx.Inertia()], "supports": pins(speed), **options},
     )
 
 

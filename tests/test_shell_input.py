@@ -205,10 +205,29 @@ FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
         "both faces",
     ),
     "temperature": (
-        lambda c: scene(plate(c), effects=[fx.Temperature(100.0)]),
-        "not possible in shells",
+        lambda c: run(
+            scene(plate(c), effects=[fx.Temperature(lambda x: np.where(x[0] > 1, np.nan, 0.0))])
+        ),
+        "not a finite number",
     ),
-    "inertia": (lambda c: scene(plate(c), effects=[fx.Inertia()]), "not possible in shells"),
+    "inertia without density": (
+        lambda c: scene(
+            plate(c),
+            materials=fx.Section(fx.Isotropic(70e3, 0.3), thickness=1.0),
+            effects=[fx.Inertia()],
+        ),
+        "no density",
+    ),
+    "damping by stiffness": (
+        lambda c: scene(plate(c), effects=[fx.Inertia(density=1.0, rayleigh=(0.0, 1.0))]),
+        "damping by stiffness is not available",
+    ),
+    "explicit dynamics": (
+        lambda c: scene(plate(c), effects=[fx.Inertia(density=1.0)]).run(
+            fx.Explicit(until=fx.Time(1.0)), progress=False
+        ),
+        "no lumped masses",
+    ),
     "pressure that follows": (
         lambda c: scene(plate(c), loads=[fx.Pressure(fx.Face("plate", "top"), 1.0, follows=True)]),
         "keeps its direction",

@@ -392,6 +392,16 @@ class Continuum:
         of_point[geometry.ravel()] = np.asarray(space).ravel()
         return np.asarray(of_point[points])
 
+    def mass_density(self, density: Any, a: Any, v: Any) -> Any:
+        """Virtual work of the inertia of a motion, per volume (shells: per area); UFL.
+
+        Args:
+            density: Mass per volume; of shells, its moments over the thickness, shape (3,).
+            a: Acceleration, or another motion, of all unknowns.
+            v: Test function.
+        """
+        return density * ufl.inner(a, v)
+
     def positions(self) -> Array:
         """Positions of the local displacement nodes, owned first, shape (n, 3), length."""
         return np.asarray(self.space.tabulate_dof_coordinates())

@@ -34,6 +34,8 @@ from fxcrack.continuum.loads import (
     Traction,
 )
 from fxcrack.continuum.shell_bodies import ShellBodies, ShellPart
+from fxcrack.continuum.shell_temperature import ShellTemperature
+from fxcrack.continuum.thermal_strain import ThermalLoad
 
 
 def shell_load(shell: ShellBodies, load: Any) -> PETSc.Vec | None:
@@ -50,6 +52,10 @@ def shell_load(shell: ShellBodies, load: Any) -> PETSc.Vec | None:
     Raises:
         InputError: The load does not fit shells.
     """
+    if isinstance(load, ThermalLoad):
+        forces = ShellTemperature(shell).forces(load.pattern)
+        nodes = [p.nodes for p in shell.shell_parts]
+        return cell_vector(shell.space, list(zip(nodes, forces, strict=True)))
     if isinstance(load, PointMoment):
         return _point_moment(shell, load)
     if isinstance(load, Moment):

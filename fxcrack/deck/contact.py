@@ -301,6 +301,7 @@ class Contacts:
             contact=not card.has("TIED"),
             friction=friction,
             normal_only=pair.normal_only,
+            pairing=_pairing(card),
             gap=gap,
             name=pair.title,
         )
@@ -384,6 +385,12 @@ class Contacts:
             tolerance=tolerance,
             name=card.text("NAME", default=slave),
         )
+
+
+def _pairing(card: Card) -> str | None:
+    """How nodes follow the master where the deck says so."""
+    kinds = {"NODETOSURFACE": "node-to-surface", "SURFACETOSURFACE": "surface-to-surface"}
+    return kinds[card.word("TYPE")] if card.has("TYPE") else None
 
 
 def _release_words(card: Card) -> tuple[object, ...]:

@@ -187,6 +187,9 @@ class Flat:
     def _resolve(self, card: Card, name: str, kind: str, index: int | None) -> tuple[str, NamedSet]:
         """The space and the set that a name means."""
         text, root = key(name), self.model.root
+        own = self.model.instances.get(card.home)
+        if own is not None and text in getattr(own, kind):
+            return card.home, getattr(own, kind)[text]
         if text in getattr(root, kind):
             return "", getattr(root, kind)[text]
         words = text.split(".")
@@ -222,6 +225,7 @@ class Flat:
     def _member(self, card: Card, name: str, index: int | None, kind: str) -> Ints:
         """One node or element, "12" or "inst.12"."""
         first, _, number = key(name).rpartition(".")
+        first = first or card.home
         place = first if first in self.placed else first.rpartition(".")[2]
         if place not in self.placed:
             card.fail(f"there is no instance '{first}'", index)
@@ -245,6 +249,20 @@ class Flat:
         if key(name).rpartition(".")[2].isdigit():
             return self._member(card, name, index, "nsets")
         return self._of_set(*self._resolve(card, name, "nsets", index), "nsets")
+
+    def ordered_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
+        """As :meth:`nodes`, in the order of their numbers, or of the deck in UNSORTED sets."""
+        if key(name).rpartition(".")[2].isdigit():
+            return self._member(card, name, index, "nsets")
+        place, found = self._resolve(card, name, "nsets", index)
+        if not found.card.has("UNSORTED"):
+            return self._of_set(place, found, "nsets")
+        parts = []
+        for space_name, labels in found.members.items():
+            placed = self.placed[space_name or place]
+            at = existing(found.card, found.name, labels, placed.space.nodes.find(labels), "nodes")
+            parts.append(at + placed.first_node)
+        return np.concatenate(parts)
 
     def elements(self, card: Card, name: str, index: int | None = None) -> Ints:
         """Cells of an element set, or one element; arguments and error as for :meth:`nodes`."""

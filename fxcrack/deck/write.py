@@ -18,12 +18,12 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
 from fxcrack.continuum.loads import (
-    AmplitudeLike,
     BodyForce,
     Displacement,
     Load,
@@ -32,7 +32,6 @@ from fxcrack.continuum.loads import (
     PointForce,
     PointMoment,
     Pressure,
-    Ramp,
     Traction,
 )
 from fxcrack.continuum.temperature import Temperature
@@ -301,6 +300,8 @@ class _Writer:
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
+        if interface.stiffness is not None:
+            refuse(f"interface '{title}': stiffness of bonds")
         if interface.pairing is not None:
             refuse(f"interface '{title}': pairing='{interface.pairing}'")
         if callable(interface.friction):
@@ -381,9 +382,14 @@ class _Writer:
     def _amplitudes(self) -> list[str]:
         out = []
         for amplitude, name in self.amplitudes.items():
-            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME')
-            times = [0.0, self.end] if isinstance(amplitude, Ramp) else list(amplitude.times)
-            values = times if isinstance(amplitude, Ramp) else list(amplitude.values)
+            smooth = isinstance(amplitude, SmoothStep)
+            kind = ", DEFINITION=SMOOTH STEP" if smooth else ""
+            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME{kind}')
+            if isinstance(amplitude, Amplitude | SmoothStep):
+                times, values = list(amplitude.times), list(amplitude.values)
+            else:
+                times = sorted({0.0, *amplitude.breaks(), self.end})
+                values = [amplitude(t) for t in times]
             if times[0] > 0.0:
                 times, values = [0.0, *times], [values[0], *values]
             words = [number(x) for pair in zip(times, values, strict=True) for x in pair]
@@ -459,6 +465,8 @@ class _Writer:
         if title != load.where and self.mesh is not None:
             self.sets += self._surface(title, self.mesh.groups[_group(load.where)][1])
         if isinstance(load, Pressure):
+            if load.follows_crack:
+                refuse(f"pressure '{title}' with follows_crack")
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
                 refuse(

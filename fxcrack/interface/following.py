@@ -360,7 +360,8 @@ class _Rows:
             InputError: Dofs follow each other in a circle.
         """
         dofs = np.array(sorted(self.rows), dtype=np.int64)
-        every = np.unique([*dofs.tolist(), *(k for row in self.rows.values() for k in row)])
+        named = [*dofs.tolist(), *(k for row in self.rows.values() for k in row)]
+        every = np.unique(np.array(named, dtype=np.int64))
         place = {int(d): i for i, d in enumerate(every)}
         number = {int(d): i for i, d in enumerate(dofs)}
         i = [number[d] for d, row in self.rows.items() for _ in row]

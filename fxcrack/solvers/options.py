@@ -57,6 +57,7 @@ class ExplicitOptions:
         mass_scale: Factor on the mass of all bodies, or ``"dt"``: mass is added to nodes where
             ``dt`` would not be stable.
         operator: "product", "assembly", or "auto".
+        bulk: Linear and quadratic bulk viscosity.
         tolerance: Part of the energies by which their balance may be off before the run stops.
     """
 
@@ -66,4 +67,5 @@ class ExplicitOptions:
     penalty: float = 0.1
     mass_scale: float | str = 1.0
     operator: str = "auto"
+    bulk: tuple[float, float] = (0.0, 0.0)
     tolerance: float = 1e-6

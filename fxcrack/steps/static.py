@@ -30,7 +30,8 @@ class Static:
             load factor may then become negative.
         opening: With stepping="opening", the name of the monitor that is controlled, or of two of
             which it is the first less the second, e.g. both faces at the crack mouth. It must grow
-            with the load.
+            with the load. The name of a pressure with ``follows_crack`` controls the injected
+            volume.
         initial: First increment, in time; ``maximum`` if that is smaller than the default.
             Increment stepping only, as all below but ``maximum`` (nonlinear bodies heed it always).
         minimum: Smallest increment; needing less ends the step.
