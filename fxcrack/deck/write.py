@@ -300,6 +300,8 @@ class _Writer:
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
+        if interface.stiffness is not None:
+            refuse(f"interface '{title}': stiffness of bonds")
         if interface.pairing is not None:
             refuse(f"interface '{title}': pairing='{interface.pairing}'")
         if callable(interface.friction):
