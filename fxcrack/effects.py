@@ -13,6 +13,7 @@ from typing import Any
 
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.conserving import conserving
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
@@ -192,7 +193,8 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     terms += [
         FollowerPressure(continuum, x) for x in loads if isinstance(x, Pressure) and x.follows
     ]
-    terms += [InertiaForces(continuum, e) for e in effects if isinstance(e, Inertia)]
+    for effect in (e for e in effects if isinstance(e, Inertia)):
+        terms = [*conserving(continuum, terms, effect), InertiaForces(continuum, effect)]
     return terms
 
 

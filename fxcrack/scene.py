@@ -302,7 +302,7 @@ class Scene:
         others = [e for e in given.effects if not isinstance(e, Inertia)]
         begins = not isinstance(self.solver, ExplicitSolver)
         if begins and step.start == "equilibrium":
-            check_start(self.continuum)
+            check_start(self.continuum, given.interfaces)
         use_explicit_solver(self.analysis, lambda c: form_terms(c, others, given.loads))
         warn_of_step_release(chosen)
         if begins and step.start == "equilibrium":

@@ -62,6 +62,12 @@ def check_step(
     check_criteria(step, chosen)
     if isinstance(step, Explicit):
         return
+    for pair in analysis.pairs:
+        if pair.interface.stiffness is not None:
+            raise InputError(
+                f"interface '{pair.interface.title}': bonds with a stiffness of their own are for "
+                f"Explicit; leave stiffness out in {type(step).__name__} steps, which hold exactly"
+            )
     effects, why = analysis.effects, analysis.plan.why
     if isinstance(analysis.solver, ExplicitSolver):
         raise InputError(

@@ -33,7 +33,7 @@ def rows(ratio: float, seed: int, mu: float = 0.0) -> tuple[OpenFaces, np.ndarra
     return faces, h
 
 
-NONE: Any = SimpleNamespace(direction=np.zeros((0, 2)))
+NONE: Any = SimpleNamespace(direction=np.zeros((0, 2)), origin=np.zeros(0))
 NO_ROWS = np.zeros(0, dtype=np.int64)
 
 

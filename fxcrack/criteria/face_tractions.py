@@ -120,26 +120,15 @@ class FaceTractions:
         rows = np.flatnonzero(moves[corner].any(axis=1) & inside[s.facets].all(axis=1))
         if not len(rows):
             return None
-        points, weights = edge_quadrature(s.kind)
-        values, slopes = shape_functions(s.kind, s.order, points)
-        linear, _ = shape_functions(s.kind, 1, points)
-        facets = s.facets[rows]
-        x = np.einsum("qa,fac->fqc", values, s.x[facets])
-        tangents = np.einsum("dqa,fac->fqdc", slopes, s.x[facets])
-        q = np.einsum("qa,fac->fqc", linear, of_node[corner[rows]])
-        gram = np.einsum("fqdc,fqec->fqde", tangents, tangents)
-        share = np.linalg.solve(gram, np.einsum("fqdc,fqc->fqd", tangents, q)[..., None])[..., 0]
-        along = np.einsum("fqd,dqa->fqa", share, slopes)
-        normals, size = s.facet_normals(points)
-        normals, size = normals[rows], size[rows]
-        breadth = np.einsum("qa,fa->fq", values, s.breadth[facets])
-        traction = _traction(faces.load, x, normals)
-        force = traction * (size * breadth * weights)[..., None]
+        at_points = _moved(s, rows, of_node)
+        traction = _traction(faces.load, at_points.x, at_points.normals)
+        force = traction * at_points.size[..., None]
         # a facet that moves belongs to a cell of the ring, whose side of the interface is its own
         above = [self._above[tuple(sorted(k))] for k in s.dofs[corner[rows]].tolist()]
         return _Facets(
-            faces.number, at[facets], along, force[..., : self._gdim], x, q, np.array(above)
-        )
+            faces.number, at[s.facets[rows]], at_points.along, force[..., : self._gdim],
+            at_points.x, at_points.q, np.array(above),
+        )  # fmt: skip
 
     def work(self, u: Array, load: Array) -> float:
         """The term in a state.
@@ -172,6 +161,98 @@ class FaceTractions:
                 tip = found.reshape(n_modes, int(rows.sum()), -1, 3, 3)[..., : self._gdim, :]
                 out[:, f.number] += np.einsum("fqc,mfqcj,fqj->m", f.force[rows], tip, f.shift[rows])
         return out
+
+
+@dataclass(frozen=True)
+class OpenedFacets:
+    """The derivative of a jump along the extension, integrated over some slave facets.
+
+    Attributes:
+        nodes: Slave nodes, shape (n,).
+        weights: Of their jumps, shape (n,) [length].
+    """
+
+    nodes: Ints
+    weights: Array
+
+
+def opened_facets(
+    surface: FacetSurface, bonded: Bools, opened: Ints, nodes: Ints, cells: FrontCells, q: Array
+) -> OpenedFacets:
+    """Facets of the slave face that nodes which have just been released have opened.
+
+    Args:
+        surface: The slave face.
+        bonded: Its bonded nodes, shape (n_surface_nodes,).
+        opened: The released nodes, shape (n,).
+        nodes: Global displacement nodes of the ring, sorted, shape (n_nodes,).
+        cells: Cells of the ring.
+        q: Extension at their corners, shape (n_cells, n_corners, gdim).
+    """
+    none = OpenedFacets(np.zeros(0, dtype=np.int64), np.zeros(0))
+    if not len(opened):
+        return none
+    shift = np.zeros((len(nodes), 3))
+    ids = np.searchsorted(nodes, cells.nodes[:, : cells.n_corners])
+    shift[ids.ravel(), : q.shape[2]] = q.reshape(-1, q.shape[2])
+    at = np.searchsorted(nodes, surface.dofs)
+    at = np.where(at < len(nodes), at, 0)
+    of_node = np.where((nodes[at] == surface.dofs)[:, None], shift[at], 0.0)
+    corner = surface.facets[:, : surface.n_corners]
+    mine = np.isin(surface.facets, opened)
+    # those behind the front hold nodes that were open before
+    fresh = mine.any(axis=1) & (mine | bonded[surface.facets]).all(axis=1)
+    moves = (np.abs(of_node).max(axis=1) > 0.0)[corner].any(axis=1)
+    rows = np.flatnonzero(fresh & moves)
+    if not len(rows):
+        return none
+    at_points = _moved(surface, rows, of_node)
+    each = np.einsum("fqa,fq->fa", at_points.along, at_points.size)
+    found = np.zeros(surface.n_nodes)
+    np.add.at(found, surface.facets[rows], each)
+    chosen = np.unique(surface.facets[rows])
+    return OpenedFacets(chosen, found[chosen])
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """Facets that the extension moves, at quadrature points.
+
+    Attributes:
+        x: The points, shape (n, n_points, 3) [length].
+        q: Extension, likewise.
+        along: Derivative of each shape function along it, times its size, shape (n, n_points,
+            n_nodes).
+        normals: Outward normals, shape (n, n_points, 3).
+        size: Area that each point stands for, shape (n, n_points) [length^2].
+    """
+
+    x: Array
+    q: Array
+    along: Array
+    normals: Array
+    size: Array
+
+
+def _moved(s: FacetSurface, rows: Ints, of_node: Array) -> _Moved:
+    """Facets of a surface with the extension given at its nodes, shape (n_surface_nodes, 3)."""
+    points, weights = edge_quadrature(s.kind)
+    values, slopes = shape_functions(s.kind, s.order, points)
+    linear, _ = shape_functions(s.kind, 1, points)
+    facets, corner = s.facets[rows], s.facets[rows, : s.n_corners]
+    tangents = np.einsum("dqa,fac->fqdc", slopes, s.x[facets])
+    q = np.einsum("qa,fac->fqc", linear, of_node[corner])
+    gram = np.einsum("fqdc,fqec->fqde", tangents, tangents)
+    share = np.linalg.solve(gram, np.einsum("fqdc,fqc->fqd", tangents, q)[..., None])[..., 0]
+    normals, size = s.facet_normals(points)
+    breadth = np.einsum("qa,fa->fq", values, s.breadth[facets])
+    return _Moved(
+        np.einsum("qa,fac->fqc", values, s.x[facets]),
+        q,
+        np.einsum("fqd,dqa->fqa", share, slopes),
+        normals[rows],
+        size[rows] * breadth * weights,
+    )
 
 
 def _sides(cells: FrontCells, above: Bools) -> dict[tuple[int, ...], bool]:

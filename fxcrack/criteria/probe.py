@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.criteria.crack_closure import opens
 from fxcrack.interface.front import Front
@@ -83,6 +83,21 @@ class Bodies(Protocol):
         Args:
             nodes: Global displacement nodes, sorted, shape (n,).
             state: State of the solver.
+
+        Returns:
+            Shape (n, gdim) [length].
+        """
+        ...
+
+    def changes(self, nodes: Ints, before: State, after: State) -> Array:
+        """Change of displacements between two states of the same loads; collective.
+
+        Of bodies that are not linear by their tangent.
+
+        Args:
+            nodes: Global displacement nodes, sorted, shape (n,).
+            before: State of the solver.
+            after: Another one, from :meth:`FrontProbe.opened`.
 
         Returns:
             Shape (n, gdim) [length].
@@ -175,6 +190,21 @@ class FrontProbe(Protocol):
         """
         ...
 
+    def opened(self, nodes: Ints, closed: Bools, force: Array, state: State) -> State:
+        """The state that releasing bonded nodes would lead to, everything else as it is.
+
+        Loads and contact are those of the given state. A state near the last one, of whose bodies
+        only the displacements are asked for.
+
+        Args:
+            nodes: Bonded slave nodes, shape (k,).
+            closed: Whether their normal jump stays zero, shape (k,).
+            force: Forces that their bonds hold, global vectors, tension positive, shape (k, 3)
+                [force].
+            state: State of the solver.
+        """
+        ...
+
     def mean_position(self, group: str) -> Array:
         """Mean position of the nodes of a group in the undeformed body, shape (3,); collective.
 
@@ -219,6 +249,13 @@ def bond_forces(probe: FrontProbe, tips: Tips, state: State) -> Array:
     return np.asarray(out)
 
 
+def load_density(probe: FrontProbe, tips: Tips, state: State) -> Array:
+    """Load per area on the faces behind tips, as it acts on the slave side, shape (n_tips, 3)."""
+    areas = probe.pair.surface.areas
+    wake = probe.face_loads(tips.wake_nodes, state).sum(axis=(1, 2))
+    return np.asarray(wake / areas[tips.wake_nodes].sum(axis=(1, 2))[:, None])
+
+
 def _loads_to_come(probe: FrontProbe, tips: Tips, state: State) -> Array:
     """Load on the faces the crack is about to open, if that of the wake continues there.
 
@@ -230,8 +267,7 @@ def _loads_to_come(probe: FrontProbe, tips: Tips, state: State) -> Array:
         Global vectors per force node, shape (n, k, 3).
     """
     areas = probe.pair.surface.areas
-    wake = probe.face_loads(tips.wake_nodes, state).sum(axis=(1, 2))
-    density = wake / areas[tips.wake_nodes].sum(axis=(1, 2))[:, None]
+    density = load_density(probe, tips, state)
     whole = areas[tips.force_nodes][..., None] * density[:, None]
     to_come = whole - probe.face_loads(tips.force_nodes, state)
     to_come[~np.any(density, axis=1)] = 0.0

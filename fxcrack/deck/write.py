@@ -213,6 +213,8 @@ class _Writer:
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
+        if interface.stiffness is not None:
+            refuse(f"interface '{title}': stiffness of bonds")
         if interface.pairing is not None and self.explicit:
             refuse(f"interface '{title}': pairing='{interface.pairing}'")
         if callable(interface.friction):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.continuum import Continuum
@@ -55,8 +56,16 @@ class CondensedBodies:
 
     def displacements(self, nodes: Ints, state: Equilibrium) -> Array:
         """Displacements of global nodes, the same on all ranks; collective."""
+        return self._of_nodes(nodes, self._solver.displacement(state))
+
+    def changes(self, nodes: Ints, before: Equilibrium, after: Equilibrium) -> Array:
+        """Change of displacements between states of the same loads; collective."""
+        change = self._solver.displacement_of_jumps(after.jump - before.jump)
+        return self._of_nodes(nodes, change)
+
+    def _of_nodes(self, nodes: Ints, u: PETSc.Vec) -> Array:
+        """Values of a vector at global nodes, on all ranks, shape (n, gdim); destroys it."""
         layout = self.continuum.layout
-        u = self._solver.displacement(state)
         here = layout.is_owned(nodes)
         mine = np.zeros((len(nodes), self.continuum.gdim))
         mine[here] = layout.displacements(u.array_r)[layout.to_local(nodes[here])]

@@ -45,6 +45,7 @@ from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair, local_frames
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_bodies import BodyMotion
+from fxcrack.solvers.explicit_elastic import ElasticBonds
 from fxcrack.solvers.explicit_energies import MotionEnergies, stored_energies, sums_over_ranks
 from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
@@ -159,11 +160,15 @@ class ExplicitSolver:
         for rows, held in zip(self.row_of, self.held_by_supports, strict=True):
             numbers = gdim * rows[:, None] + np.arange(gdim)
             self.index.append(np.where((rows >= 0)[:, None] & ~held, numbers, -1))
-        tied = np.zeros(lumped.n_rows, dtype=bool)
+        bonded = np.zeros(lumped.n_rows, dtype=bool)
         for front, rows in zip(self.fronts, self.row_of, strict=True):
             has = rows >= 0
-            tied[rows[has]] = front.bonded[has]
-        self.dynamics = InterfaceDynamics(lumped, self.pairs, tied)
+            bonded[rows[has]] = front.bonded[has]
+        elastic = ElasticBonds(lumped, self.pairs, self.continuum)
+        sprung = np.any(elastic.local > 0.0, axis=1)
+        elastic.active = bonded & sprung
+        self._has_elastic = bool(sprung.any())
+        self.dynamics = InterfaceDynamics(lumped, self.pairs, bonded & ~sprung, elastic)
         self._mine = nodes.mine
         self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
         self._bonds = np.zeros((lumped.n_rows + 1, gdim))
@@ -227,12 +232,22 @@ class ExplicitSolver:
 
     def _stable_by(self, steps: int) -> float:
         """The stable increment by some more Lanczos steps; collective."""
-        omega, viscosity = self._highest(self.bodies.tangent_product, steps), self.further.viscosity
+        omega, viscosity = self._highest(self._tangent_product, steps), self.further.viscosity
         rate = 0.0
         if viscosity is not None:
             viscosity.forces(self.velocity)
             rate = self._damping_rate(viscosity.product, steps) ** 2
         return rounded_down(damped_increment(omega, rate))
+
+    def _tangent_product(self, direction: Array) -> Array:
+        """Tangent of bodies and elastic bonds times a direction, owned dofs; collective."""
+        out = self.bodies.tangent_product(direction)
+        elastic, lumped = self.dynamics.elastic, self.lumped
+        if elastic.exist:
+            jumps = lumped.jumps(lumped.nodes.gather(direction))
+            forces = lumped.on_nodes(elastic.forces(jumps))
+            out[self._at_interface] -= forces[self._mine].ravel()
+        return out
 
     def _take_viscosity(self, options: ExplicitOptions) -> None:
         linear, quadratic = options.bulk
@@ -365,6 +380,10 @@ class ExplicitSolver:
         self._bonds[lumped.open] = 0.0
         self._bonds[rows] = forces
         self._jumps[lumped.open] = dynamics.gap
+        if dynamics.elastic.exist:
+            held = dynamics.elastic.rows
+            self._bonds[lumped.open] = dynamics.elastic.forces(dynamics.gap)
+            self._jumps[held] = 0.0
         self._bonds_known = True
 
     def _without_supports(self, rows: Ints, forces: Array) -> Array:
@@ -389,6 +408,8 @@ class ExplicitSolver:
         v = self.velocity if whole else self._velocity
         before = v.copy() if whole else v
         old = prescribed.motion(v, dynamics.v)
+        if dynamics.elastic.exist and dt != self.last_dt:
+            self._interface_before, self._jumps_before = dynamics.v.copy(), dynamics.gap
         if self._damping:
             v *= 1.0 - h * self._damping
         self.motion.add_change(v)
@@ -413,6 +434,7 @@ class ExplicitSolver:
             # U of linear bodies is u^n . f_int(u^{n+1})/2: it changes with the length of increments
             more = 0.25 * (dt - self.last_dt) * float(self._internal @ (v - before))
             more = sums_over_ranks(self.comm, more)[0]
+            more += self._of_elastic_bonds(dt)
             if self.increments:
                 energies.renewed -= more
             else:
@@ -428,6 +450,15 @@ class ExplicitSolver:
         self.increments += 1
         self._bonds_known = False
         self.seconds["update"] += clock.perf_counter() - start
+
+    def _of_elastic_bonds(self, dt: float) -> float:
+        """What a change of the increment does to the energy of elastic bonds."""
+        dynamics = self.dynamics
+        if not dynamics.elastic.exist:
+            return 0.0
+        change = dynamics.v - self._interface_before
+        pull = dynamics.elastic.forces(self._jumps_before)
+        return -0.25 * (dt - self.last_dt) * float(np.vdot(pull, self.lumped.jumps(change)))
 
     def reactions(self) -> Array:
         """Reactions of the prescribed dofs of this rank, in the order of :attr:`prescribed`.
@@ -457,6 +488,8 @@ class ExplicitSolver:
         out = stored_energies(self.bodies, self.motion, self.mass, self.velocity, self.last_dt)
         out["kinetic_energy"] += self.lumped.excess_energy(self.dynamics.v)
         out["strain_energy"] -= self._thermal_part()
+        if self._has_elastic:
+            out["bond_energy"] = self.dynamics.stored()
         return out
 
     def _thermal_part(self) -> float:

@@ -28,6 +28,8 @@ from fxcrack.solvers.explicit_softening import LiveBonds, settled
 
 SWEEPS = 1000
 """Sweeps, at most. They go with the root of the ratio of densities: 50 for 5, 190 for 32."""
+_SECANTS = 40
+"""Sweeps in which separate rows take secants, which need ten at most where they converge."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +153,7 @@ def find_forces(
         hh: dt h.
         start: Forces to begin with, those of the last increment, where ties are the same.
     """
-    here = (gap[soft] * live.direction).sum(axis=1)
+    here = (gap[soft] * live.direction).sum(axis=1) - live.origin
     last = FaceForces(
         np.zeros(len(soft)), np.zeros(len(free)), np.zeros_like(free), faces.may_touch[:0]
     )
@@ -159,6 +161,7 @@ def find_forces(
         last.pressure, last.holding = start.pressure, start.holding
     # the present forces, and those a sweep begins at, which acceleration puts ahead of them
     pressure, holding, gain = last.pressure, last.holding, 1.0
+    before: tuple[Array, Array] | None = None
     for sweep in range(SWEEPS):
         there, first = free, not sweep and start is None
         if not first:
@@ -168,7 +171,7 @@ def find_forces(
         # left, while the other way round each would give way to the other little by little
         waits = first and faces.rough and len(soft) > 0
         if len(soft) and not waits:
-            opening = (there[soft] * live.direction).sum(axis=1)
+            opening = (there[soft] * live.direction).sum(axis=1) - live.origin
             strength = live.together(here, opening, hh)
             pull = np.zeros_like(there)
             pull[soft] = -strength[:, None] * live.direction
@@ -188,10 +191,33 @@ def find_forces(
             and settled(held, holding)
         ):
             return found
-        pressure, holding, gain = _ahead(last, found, pressure, holding, gain)
+        if faces.separate and not faces.rough and sweep < _SECANTS:
+            change = new - pressure
+            ahead = _secant(before, (pressure, change))
+            before, pressure = (pressure, change), ahead
+        else:
+            pressure, holding, gain = _ahead(last, found, pressure, holding, gain)
         last = found
     last.settled = False
     return last
+
+
+def _secant(before: tuple[Array, Array] | None, now: tuple[Array, Array]) -> Array:
+    """Where the changes of pressures of separate rows would be zero, by their last two values.
+
+    A bond that has hardly opened is stiff: alone, each sweep would take a thousandth of the way.
+
+    Args:
+        before: Pressures of the sweep before the last and what it changed, shape (n_open,) each.
+        now: Those of the last.
+    """
+    pressure, change = now
+    factor = np.ones(len(change))
+    if before is not None:
+        way, less = pressure - before[0], before[1] - change
+        some = (way * less > 0.0) & (np.abs(less) > 0.0)
+        factor[some] = np.clip(way[some] / less[some], 1.0, 1e9)
+    return np.asarray(np.maximum(pressure + factor * change, 0.0))
 
 
 def _ahead(

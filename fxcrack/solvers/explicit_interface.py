@@ -28,6 +28,7 @@ from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
+from fxcrack.solvers.explicit_elastic import ElasticBonds
 from fxcrack.solvers.explicit_faces import (
     SWEEPS,
     FaceForces,
@@ -37,6 +38,9 @@ from fxcrack.solvers.explicit_faces import (
     without_gain,
 )
 from fxcrack.solvers.explicit_softening import LiveBonds
+
+_LEFT = 1e-6
+"""Energy left to an elastic bond over that it had stored, below which it is free at once."""
 
 
 @dataclass
@@ -80,12 +84,15 @@ class ChosenBonds:
     """Bond forces of some tied rows, as long as ties stay as they are.
 
     Attributes:
-        by_forces: From the forces on the nodes, (n gdim, n_nodes gdim).
+        by_forces: From the forces on the nodes, (n gdim, n_nodes gdim); of elastic bonds jumps from
+            their displacements.
         by_motion: From the accelerations that supports prescribe at nodes, (n gdim, n_prescribed).
+        stiffness: Of elastic bonds, shape (n, gdim, gdim), force/length.
     """
 
     by_forces: Product
     by_motion: Product | None
+    stiffness: Array | None = None
 
 
 class InterfaceDynamics:
@@ -95,6 +102,7 @@ class InterfaceDynamics:
         lumped: Masses and weights.
         pairs: Interfaces.
         tied: Rows that are tied at the beginning, shape (n_rows,).
+        elastic: Bonds with a stiffness of their own; their rows are open.
 
     Attributes:
         fading: Bond forces that fall with time.
@@ -102,9 +110,11 @@ class InterfaceDynamics:
         penalty: Stiffness of contact over m/dt^2 of the pair; ``None``: by multipliers.
     """
 
-    def __init__(self, lumped: LumpedInterface, pairs: Sequence[Pair], tied: Bools) -> None:
+    def __init__(
+        self, lumped: LumpedInterface, pairs: Sequence[Pair], tied: Bools, elastic: ElasticBonds
+    ) -> None:
         gdim = lumped.frames.shape[-1]
-        self.lumped = lumped
+        self.lumped, self.elastic = lumped, elastic
         self._shape = len(lumped.nodes), gdim
         n = len(lumped.nodes) * gdim
         # displacement and velocity, those of the end of the increment, and work space
@@ -200,11 +210,13 @@ class InterfaceDynamics:
         """Take the frames of the rows, which have turned, and prepare what depends on them."""
         lumped = self.lumped
         rows = lumped.open
+        self.elastic.renew()
         self._normal = lumped.frames[rows][:, :, 0]
         self._compliance = np.einsum("nc,nc->n", lumped.compliance, self._normal**2)
         scale = self._compliance.max(initial=0.0)
         # prescribed on all sides along the normal: no force could keep such a pair apart
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
+        may_touch &= ~self.elastic.active[rows]
         self._may_touch = np.flatnonzero(may_touch)
         self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
         self._has_gap = bool(np.any(lumped.gap[rows]))
@@ -227,15 +239,43 @@ class InterfaceDynamics:
         self._place = place
         self._soft = place[self._live.rows]
 
-    def release(self, rows: Ints) -> None:
-        """Untie rows; what holds them afterwards is given by the methods below."""
+    def release(self, rows: Ints) -> Array:
+        """Untie rows; what holds them afterwards is given by the methods below.
+
+        Returns:
+            Energy that was stored in the bonds of the rows, shape (n,), force times length.
+        """
+        lost = np.zeros(len(rows))
+        if self.elastic.exist:
+            lost = self._stored_by_row()[rows]
+            self.energies.bonds += float(lost.sum())
+            held = self.elastic.active.copy()
+            held[rows] = False
+            self.elastic.hold(held)
         before = self.lumped.excess_energy(self.v)
         tied = self.lumped.tied.copy()
         tied[rows] = False
         self.set_ties(tied)
         self.energies.ties += before - self.lumped.excess_energy(self.v)
+        return lost
 
-    def soften(self, rows: Ints, force: Array, onset: Array, energy: Array, area: Array) -> None:
+    def _stored_by_row(self) -> Array:
+        """Energy of elastic bonds in the middle of the last increment, shape (n_rows,)."""
+        last = 2.0 * self._h - self._dt
+        now = self.lumped.jumps(self.u)
+        return self.elastic.energies(now - last * self.lumped.jumps(self.v), now)
+
+    def stored(self) -> float:
+        """Energy of elastic bonds in the middle of the last increment, force times length."""
+        return float(self._stored_by_row().sum()) if self.elastic.exist else 0.0
+
+    def elastic_forces(self) -> Array:
+        """Forces of elastic bonds at the start of the increment, shape (n_nodes, gdim), force."""
+        return self.lumped.on_nodes(self.elastic.forces(self.gap))
+
+    def soften(
+        self, rows: Ints, force: Array, onset: Array, energy: Array, area: Array, lost: Array
+    ) -> None:
         """Let the bonds of rows that were released soften with their opening.
 
         Args:
@@ -244,15 +284,22 @@ class InterfaceDynamics:
             onset: Size of the force at which the law begins over the one at debonding, shape (n,).
             energy: What each bond is to spend, shape (n,), force times length.
             area: Area that the release of each sweeps, shape (n,), length^2.
+            lost: Part of the energy that was stored in the bond and is gone, shape (n,).
         """
         bonds, size = self._bonds, np.linalg.norm(force, axis=1)
-        some = size > 0.0
+        bonds.spent[rows], bonds.area[rows] = lost, area
+        energy = energy - lost
+        some = (size > 0.0) & (energy > _LEFT * lost)
+        bonds.freed[rows[~some]] = True
         rows, size, force = rows[some], size[some], force[some]
         bonds.direction[rows] = -force / size[:, None]
         bonds.strength[rows] = size * onset[some]
         bonds.final[rows] = 2.0 * energy[some] / bonds.strength[rows]
         bonds.low[rows] = bonds.top[rows] = 0.0
-        bonds.area[rows] = area[some]
+        if np.any(self.elastic.local[rows]):
+            motion = self.u - (self._h - 0.5 * self._dt) * self.v
+            at = self.lumped.jumps_along(rows, bonds.direction[rows])(motion.ravel())
+            bonds.origin[rows] = at
         bonds.active[rows] = True
         self._soften()
 
@@ -270,6 +317,8 @@ class InterfaceDynamics:
             dt: Increment, time.
         """
         lumped = self.lumped
+        if self.elastic.exist:
+            forces = forces + self.elastic_forces().ravel()
         self._forces, self._more, self._h, self._dt = forces, None, h, dt
         a = lumped.accelerations.into(forces, self._a)
         if len(self._fixed):
@@ -457,10 +506,16 @@ class InterfaceDynamics:
 
     def chosen_bonds(self, rows: Ints) -> ChosenBonds:
         """Prepare :meth:`bonds_at` for some tied rows, shape (n,)."""
+        if np.any(self.elastic.active[rows]):
+            jumps = self.lumped.mean_jumps(rows[:, None], np.ones((len(rows), 1)))
+            return ChosenBonds(jumps, None, self.elastic.stiffness_of(rows))
         return ChosenBonds(*self.lumped.bonds_of(rows, self._fixed))
 
     def bonds_at(self, chosen: ChosenBonds) -> Array:
         """Bond forces on the slaves of chosen rows, shape (n gdim,), force."""
+        if chosen.stiffness is not None:
+            d = chosen.by_forces(self._u).reshape(-1, self._shape[1])
+            return np.asarray(-np.einsum("ncd,nd->nc", chosen.stiffness, d)).ravel()
         more = self._more
         out = chosen.by_forces(self._forces if more is None else self._forces + more)
         if chosen.by_motion is not None:

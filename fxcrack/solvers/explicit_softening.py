@@ -31,6 +31,7 @@ class LiveBonds:
     Attributes:
         rows: Rows of the interface, shape (n,).
         direction: Directions of their openings, shape (n, gdim).
+        origin: Jumps from which openings count, shape (n,), length.
         along: Openings by the motion of the nodes, (n, n_nodes gdim).
         push: Accelerations of the nodes by forces along the openings, (n_nodes gdim, n).
         coupling: Accelerations of the openings by such forces, shape (n, n).
@@ -45,6 +46,7 @@ class LiveBonds:
         self.push, self.coupling = lumped.pull_along(k, self.direction)
         self.coupled = not lumped.simple
         self._strength, self._final = bonds.strength[k], bonds.final[k]
+        self.origin = bonds.origin[k]
         self._numbers = list(zip(self._strength.tolist(), self._final.tolist(), strict=True))
         self.low, self.top = bonds.low[k].tolist(), bonds.top[k].tolist()
         self._diagonal = self.coupling.diagonal().copy()
@@ -92,7 +94,7 @@ class LiveBonds:
             hh: dt h.
         """
         here, free = self.along.into(u, self._buffers[0]), self.along.into(x, self._buffers[1])
-        return self.together(here, free, hh)
+        return self.together(here - self.origin, free - self.origin, hh)
 
     def together(self, here: Array, free: Array, hh: float) -> Array:
         """Forces of the bonds on each other's openings, tension positive, shape (n,).
@@ -101,7 +103,7 @@ class LiveBonds:
         masters.
 
         Args:
-            here: Openings at the start of the increment, shape (n,), length.
+            here: Openings at the start of the increment from :attr:`origin`, shape (n,), length.
             free: Openings at its end without the forces of any of them, same shape.
             hh: dt h.
         """
@@ -148,6 +150,7 @@ class LiveBonds:
         self.along.into(before, old)
         self.along.into(v, new)
         self.along.into(u, at)
+        at -= self.origin
         bonds, k, spent = self._bonds, self.rows, 0.0
         numbers = zip(
             forces.tolist(), old.tolist(), new.tolist(), at.tolist(), k.tolist(), strict=True

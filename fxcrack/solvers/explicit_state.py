@@ -30,12 +30,14 @@ class InterfaceSnapshot:
 
     Attributes:
         tied: Rows that are tied, shape (n_rows,).
+        elastic: Rows whose elastic bonds hold, shape (n_rows,).
         bonds: Softening bonds.
         fading: Bonds that fade.
         energies: What has left the bodies.
     """
 
     tied: Bools
+    elastic: Bools
     bonds: SofteningBonds
     fading: list[Fading]
     energies: InterfaceEnergies
@@ -46,8 +48,8 @@ class InterfaceSnapshot:
         bonds = dynamics.bonds
         copied = {f.name: getattr(bonds, f.name).copy() for f in fields(bonds)}
         return cls(
-            dynamics.lumped.tied.copy(), SofteningBonds(**copied), list(dynamics.fading),
-            replace(dynamics.energies),
+            dynamics.lumped.tied.copy(), dynamics.elastic.active.copy(), SofteningBonds(**copied),
+            list(dynamics.fading), replace(dynamics.energies),
         )  # fmt: skip
 
     def restore(self, dynamics: InterfaceDynamics) -> None:
@@ -56,11 +58,12 @@ class InterfaceSnapshot:
         dynamics.bonds = SofteningBonds(**again)
         dynamics.fading = list(self.fading)
         dynamics.energies = replace(self.energies)
+        dynamics.elastic.active = self.elastic.copy()
         dynamics.set_ties(self.tied)
 
     def arrays(self) -> Arrays:
         """Plain arrays by name: those of the bonds, rows and forces of fading ones, energies."""
-        out: Arrays = {"tied": self.tied}
+        out: Arrays = {"tied": self.tied, "elastic": self.elastic}
         out |= {f"bonds.{f.name}": getattr(self.bonds, f.name) for f in fields(self.bonds)}
         out["energies"] = np.array(list(asdict(self.energies).values()))
         gdim = self.bonds.direction.shape[1]
@@ -87,7 +90,8 @@ class InterfaceSnapshot:
             for r, f, (_, increments, viscosity, age) in zip(rows, forces, law, strict=False)
         ]
         energies = InterfaceEnergies(*arrays["energies"].astype(float).tolist())
-        return cls(arrays["tied"].astype(bool), bonds, fading, energies)
+        tied, elastic = (arrays[name].astype(bool) for name in ("tied", "elastic"))
+        return cls(tied, elastic, bonds, fading, energies)
 
 
 @dataclass(frozen=True)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg import cho_solve
@@ -77,7 +79,8 @@ class CondensedFrontProbe:
         error = np.minimum(system.cholesky.round_off, most)
         each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
         if not each.any() and system.n_retained:
-            each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
+            rows = np.unique(index[index >= 0])
+            each[rows] = _OF_PRODUCTS * (np.abs(system.schur[rows, : len(x)]) @ x)
         return np.asarray(each[np.where(index >= 0, index, -1)].max(axis=-1))
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
@@ -138,6 +141,25 @@ class CondensedFrontProbe:
         world = np.zeros((len(index), 3))
         world[:, : self.gdim] = np.einsum("kci,ki->kc", frames, jump)
         return world
+
+    def opened(self, nodes: Ints, closed: Bools, force: Array, state: Equilibrium) -> Equilibrium:
+        """The state that releasing bonded nodes would lead to, everything else as it is."""
+        index, frames = self._solver.index[self._p][nodes], self._solver.frames[self._p][nodes]
+        moves = index >= 0
+        moves[:, 0] &= ~closed
+        new = index[moves]
+        system = self._solver.system
+        local = np.einsum("kci,kc->ki", frames, force[:, : self.gdim])[moves]
+        try:
+            factor = system.cholesky.factorise(system.reduced(new), new)
+        except NotPositiveDefinite:
+            return state
+        opening = cho_solve((factor, True), local)
+        jump, free = state.jump.copy(), system.cholesky.free
+        jump[new] += opening
+        if len(free):
+            jump[free] -= system.cholesky.solve(system.schur[np.ix_(free, new)] @ opening)
+        return replace(state, jump=jump)
 
     def mean_position(self, group: str) -> Array:
         """Mean reference position of the nodes of a group, shape (3,) [length]; collective.

@@ -288,6 +288,16 @@ class LinearSolver(InterfaceSolver):
         last[self.system.n_retained : self.system.n_retained + self.n_loads] = state.loads
         return self.condensation.displacement(last)
 
+    def displacement_of_jumps(self, jump: Array) -> PETSc.Vec:
+        """Displacement that retained jumps alone cause, shape (n_retained,) [length]; collective.
+
+        Without loads; the caller destroys it.
+        """
+        assert self.condensation is not None
+        last = np.zeros(len(self.system.schur))
+        last[: self.system.n_retained] = jump
+        return self.condensation.displacement(last)
+
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies, K u - f.
 

@@ -215,7 +215,7 @@ class ExplicitDriver:
         solver = self.solver
         if not self._may_overlap.any():
             return
-        gap, row = solver.dynamics.smallest_gap(self._may_overlap)
+        gap, row = solver.dynamics.smallest_gap(self._may_overlap & ~solver.dynamics.elastic.active)
         if row < 0 or gap >= -_OVERLAP * float(np.abs(solver.jumps).max()):
             return
         p = int(solver.lumped.pair[row])

@@ -64,12 +64,19 @@ def check_bodies(continuum: Continuum, loads: Sequence[Any]) -> None:
             )
 
 
-def check_start(continuum: Continuum) -> None:
-    """Refuse a start in equilibrium of bodies that may have yielded on the way there.
+def check_start(continuum: Continuum, interfaces: Sequence[Interface]) -> None:
+    """Refuse a start in equilibrium that statics of exact bonds and elastic bodies does not give.
 
     Raises:
-        InputError: A material yields.
+        InputError: A material yields, or bonds have a stiffness.
     """
+    for interface in interfaces:
+        if interface.stiffness is not None:
+            raise InputError(
+                f"Explicit: start='equilibrium' is that of exact bonds, and interface "
+                f"'{interface.title}' has bonds with a stiffness; begin at rest, and apply the "
+                "loads slowly (SmoothStep)"
+            )
     for material in continuum.part_materials:
         if getattr(material, "form", "elastic") == "plastic":
             raise InputError(

@@ -82,6 +82,7 @@ class NewtonLoadPath:
         beyond: tuple[float, float] | None = None
         bracket: Bracket | None = None
         accepted, idle, strict = 0, 0, True  # increments accepted since the last cutback
+        undecided = 0  # how often f was on both sides of 1 at one load
         while True:
             if self._renew():
                 beyond = bracket = None  # with other pairs f was another one there
@@ -131,6 +132,10 @@ class NewtonLoadPath:
             if off >= -_AT_ONE:
                 if jumps and off > _AT_ONE:
                     self._report_jump(before, level, bracket)
+                return True
+            undecided += jumps
+            if undecided > 1:
+                self._report_jump(before, level, bracket)
                 return True
             if -off < _NEAR_ONE and -off > 0.5 * abs(before - 1.0):
                 return True  # nearer than the iteration can resolve

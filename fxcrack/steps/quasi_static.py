@@ -6,6 +6,7 @@ controlled opening; increments are in :mod:`fxcrack.steps.increment_stepping`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -32,6 +33,8 @@ _ABOVE = 1.0 + 1e-9
 """Values of f above this are more than 1."""
 _AT_ONE = 1e-6
 """How far from 1 a search for f = 1 may end, that of nonlinear bodies included."""
+_ONE_LOAD = 1e-6
+"""Loads along a path that differ by less than this part are one, to what searches resolve."""
 
 
 def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
@@ -111,19 +114,27 @@ def step_along_path(driver: StepDriver) -> str:
     """Keep a proportional load on the equilibrium path at f = 1; returns why the step ended."""
     analysis = driver.analysis
     control = LoadFactor(driver)
+    fell = math.nan  # load at which f, coming from above, jumped over 1 since the last release
     while True:
         driver.checkpoint_point()
         reason = driver.ended()
         if reason:
             return reason
-        if analysis.largest > _ABOVE:
+        down = analysis.largest > _ABOVE
+        if down:
             if not control.fall_to_one():
                 return control.why_above()
         elif not _reached(driver) and not _load_to_event(driver):
             return driver.ended() or _never(driver)
         most = 1.0 + max(_AT_ONE, driver.path.resolution)
-        if not _reached(driver) or analysis.largest > most:
+        if down and (not _reached(driver) or analysis.largest > most):
+            fell = analysis.time
+        # faces in friction stick when the load turns back, and f with them jumps: where it does so
+        # in both directions at one load, there is no state with f = 1, and the bond goes at f > 1
+        turns = analysis.largest > most and abs(analysis.time - fell) <= _ONE_LOAD * abs(fell)
+        if not turns and (not _reached(driver) or analysis.largest > most):
             continue  # f jumped over 1 where bonds ran through unstable states, or the end came
+        fell = math.nan
         driver.record("onset")
         release_critical(analysis)
         driver.record("release")
