@@ -144,6 +144,7 @@ def run_step(
     for g in analysis.active:
         if not len(g.tips()):
             log.warn("%s, so nothing can debond", why_no_tip(g.front))
+    _check_lengths(analysis, step)
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
     check_same_call(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
     restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
@@ -165,6 +166,26 @@ def run_step(
         warn_of_turns(analysis.continuum, constraints, u.array_r.copy())
         u.destroy()
     return first
+
+
+def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None:
+    """Refuse a crack length to stop at that the crack exceeds before the step begins.
+
+    Raises:
+        InputError: It does; a length that is just reached ends the step at once, as before.
+    """
+    for end in step.ends:
+        if not isinstance(end, CrackLength):
+            continue
+        for g in analysis.active:
+            if g.debond.interface is end.interface and len(g.tips()):
+                length = g.extent.length(g.tips())
+                if length > end.length + 1e-9 * abs(length):
+                    raise InputError(
+                        f"CrackLength({end.length:g}): the crack of '{g.title}' is {length:g} long "
+                        "already; lengths count from the end of the surface at which it is open; "
+                        "give a larger one"
+                    )
 
 
 def _prepare(

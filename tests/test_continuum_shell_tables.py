@@ -16,6 +16,7 @@ from scipy.integrate import quad
 
 import fxcrack as fx
 from fxcrack.beam_theory import CorrectedBeam
+from fxcrack.demos import shell_dcb
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.dcb import dcb_3d
 
@@ -183,6 +184,18 @@ def test_l_frame_of_first_order(n: int, wanted: float) -> None:
     frame = (length**3 + length**3 / 3.0) / (modulus * b * t**3 / 12.0)
     assert scene.history["m[u]"][-1] / frame == pytest.approx(wanted, abs=4e-3)
     scene.close()
+
+
+@pytest.mark.slow
+def test_a_wide_specimen_at_a_tenth_of_the_unknowns() -> None:
+    """25 wide, one cell per arm, 5 long and wide: load and G of each strip of the width within 2 %.
+
+    Reference: second-order solids, two over an arm, 1 long at the front and 2.5 wide.
+    """
+    reference = shell_dcb.solve(shell_dcb.Model(False, 1.0, 2.5, ny=2, coarse=2.5))
+    found = shell_dcb.solve(shell_dcb.Model(True, 5.0, 5.0, coarse=10.0))
+    assert found["unknowns"] < 0.1 * reference["unknowns"]
+    assert np.abs(shell_dcb.beside(found, reference)).max() < 0.02
 
 
 @pytest.mark.slow

@@ -15,6 +15,8 @@ import pytest
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.base import compat
+from fxcrack.mesh import Group
 from fxcrack.meshes.sheets import Sheet, sheets
 
 UD = fx.Orthotropic(
@@ -133,6 +135,27 @@ def test_arms_a_hundredth_of_the_crack_thick(
     """Cells 17 times as long as an arm of 0.3 is high."""
     load, _ = over_beam_theory(dcb(comm, element, 5.0, height=0.3), 0.3)
     assert load == pytest.approx(wanted, abs=3e-3)
+
+
+def test_a_face_of_several_sections(comm: MPI.Intracomm) -> None:
+    """An arm that is thicker on its outside far behind the front: the bonded face is flush."""
+
+    def parts(mesh: fx.Mesh) -> None:
+        x = mesh.domain.geometry.x[compat.geometry_dofmap(mesh.domain)].mean(axis=1)
+        for name, here in (("near", x[:, 0] < 60.0), ("far", x[:, 0] > 60.0)):
+            cells = np.flatnonzero(here & (x[:, 2] > 0.0)).astype(np.int32)
+            mesh.groups[name] = Group(2, cells)
+
+    plain = dcb(comm, ("quadrilateral", 1), 2.5)
+    load, rate = over_beam_theory(plain)
+    parts(plain.mesh)
+    near, low = fx.Section(UD, thickness=HEIGHT), fx.Section(UD, thickness=HEIGHT)
+    far = fx.Section(UD, thickness=2.0, offset=0.5 * (2.0 - HEIGHT))
+    stepped = plain.rebuilt(materials={"near": near, "far": far, "lower": low})
+    # 20 thicknesses behind the front
+    assert over_beam_theory(stepped) == pytest.approx((load, rate), rel=1e-3)
+    with pytest.raises(fx.InputError, match="offsets that put this side at one height"):
+        plain.rebuilt(materials={"near": near, "far": fx.Section(UD, thickness=2.0), "lower": low})
 
 
 def test_triangles_as_quadrilaterals(comm: MPI.Intracomm) -> None:

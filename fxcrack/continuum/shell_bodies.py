@@ -261,7 +261,8 @@ class ShellBodies(Continuum):
         if found[-1] - found[0] > 1e-12 * max(abs(found[0]), abs(found[-1])):
             raise InputError(
                 f"Face '{face}': its cells belong to sections whose {face.side} lies at z = "
-                f"{found[0]:g} and at {found[-1]:g}; name a face of one section"
+                f"{found[0]:g} and at {found[-1]:g}; name a face of one section, or give the "
+                "sections offsets that put this side at one height"
             )
         return float(found[0])
 

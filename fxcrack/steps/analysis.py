@@ -37,6 +37,9 @@ from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.force_ramps import ForceRamp, given_forces, still_pulling
 
+_ROUND_OFF = 1e-10
+"""Overlap of faces over the size of their facets that is round-off of coordinates."""
+
 
 @dataclass
 class EnergyBalance:
@@ -203,6 +206,8 @@ class Analysis:
         solver = self.condensed
         system = solver.system
         overlap = np.where(system.contact, np.maximum(-system.gap, 0.0), 0.0)
+        size = max((pair.surface.facet_size for pair in self.pairs), default=0.0)
+        overlap[overlap <= _ROUND_OFF * size] = 0.0
         dynamic = any(isinstance(e, Inertia) for e in self.effects)
         if not dynamic and not overlap.any():
             return
