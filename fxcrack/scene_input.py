@@ -20,6 +20,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint, Coupling, Equation
+from fxcrack.continuum.foundation import Foundation, Stabilise, check_stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import (
     Axisymmetric,
@@ -81,6 +82,7 @@ class SceneInput:
     effects: Sequence[Any] = ()
     solver: str | None = None
     newton: NewtonOptions | None = None
+    stabilise: Stabilise | None = None
 
     def __post_init__(self) -> None:
         """Check kinds and names."""
@@ -115,6 +117,8 @@ class SceneInput:
             )
         self._check_materials()
         text("Scene", "solver", self.solver, optional=True)
+        if self.stabilise is not None:
+            check_stabilise(self.stabilise)
         titles = [i.title for i in self.interfaces]
         for title in titles:
             if titles.count(title) > 1:
@@ -189,14 +193,16 @@ def compose(given: SceneInput) -> Analysis:
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
     parts = continuum, pairs, supports, loads, list(given.monitors)
+    foundation = None if given.stabilise is None else Foundation(continuum, given.stabilise)
     solver: Solver
     if chosen.solver == "linear":
-        solver = LinearSolver(*parts, given.options or CondensedOptions())
+        solver = LinearSolver(*parts, given.options or CondensedOptions(), foundation)
     else:
+        terms = form_terms(continuum, given.effects, given.loads)
         solver = NewtonSolver(
             *parts,
             given.options or CondensedOptions(rows=0.0),
-            bodies=WeakForm(continuum, form_terms(continuum, given.effects, given.loads)),
+            bodies=WeakForm(continuum, terms + ([foundation] if foundation else [])),
             newton=given.newton or NewtonOptions(),
         )
     return Analysis(
@@ -207,6 +213,7 @@ def compose(given: SceneInput) -> Analysis:
         list(given.effects),
         History(given.mesh.comm),
         EnergyBalance(),
+        stabilise=given.stabilise,
     )
 
 

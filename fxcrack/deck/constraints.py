@@ -114,6 +114,8 @@ def read_constraints(cards: Sequence[Card], flat: Flat) -> Constraints:
                 card.fail("it belongs directly after *COUPLING")
             distributed.append(distributing(coupling, card, _reference(coupling, flat), flat))
             coupling = None
+        elif card.keyword == "KINEMATICCOUPLING":
+            rigid += _kinematic_by_nodes(card, flat)
         elif card.keyword == "RIGIDBODY":
             rigid.append(_rigid_body(card, flat))
     if coupling is not None:
@@ -165,7 +167,33 @@ def _kinematic(coupling: Card, card: Card, flat: Flat) -> RigidSet:
     return _set(coupling, title, nodes, dofs or set(range(6)), reference, flat)
 
 
+def _kinematic_by_nodes(card: Card, flat: Flat) -> list[RigidSet]:
+    """The former ``*KINEMATIC COUPLING``: nodes with the components that follow, line by line."""
+    reference = _reference(card, flat)
+    dofs: dict[int, set[int]] = {}
+    for row in card.need_rows("node or set, first and last component"):
+        first = row.whole(1, 1)
+        last = row.whole(2, first if row.text(1) else 6) or first
+        if not 1 <= first <= last <= 6:
+            row.fail(f"components {first} to {last} are none of 1 to 6")
+        for node in flat.with_centres(flat.nodes(card, row.text(0), row.index)).tolist():
+            dofs.setdefault(node, set()).update(range(first - 1, last))
+    alike: dict[frozenset[int], list[int]] = {}
+    for node, components in dofs.items():
+        alike.setdefault(frozenset(components), []).append(node)
+    name = _titled(card, f"coupling to {card.text('REF NODE')}")
+    return [
+        _set(card, name, np.array(sorted(nodes), dtype=np.int64), set(components), reference, flat)
+        for components, nodes in alike.items()
+    ]
+
+
 def _rigid_body(card: Card, flat: Flat) -> RigidSet:
+    if card.has("ANALYTICAL SURFACE"):
+        card.fail(
+            "analytical rigid surfaces are not available; mesh a stiff body with the surface, or, "
+            "on a plane of symmetry, model the other half"
+        )
     names = [n for n in ("TIE NSET", "PIN NSET", "NSET", "ELSET") if card.has(n)]
     parts = [flat.nodes(card, card.text(name)) for name in names if name != "ELSET"]
     if card.has("ELSET"):

@@ -92,7 +92,11 @@ _READ = {
     "DISTRIBUTING": ("WEIGHTING METHOD", ""),
     "EQUATION": ("INPUT", ""),
     "MPC": ("INPUT", ""),
-    "RIGID BODY": ("REF NODE, ELSET, TIE NSET, PIN NSET, NSET", "POSITION"),
+    "RIGID BODY": (
+        "REF NODE, ELSET, TIE NSET, PIN NSET, NSET, ANALYTICAL SURFACE",
+        "POSITION",
+    ),
+    "KINEMATIC COUPLING": ("REF NODE", ""),
     "INITIAL CONDITIONS": ("TYPE, NORMAL", ""),
     "NODAL ENERGY RATE": ("GENERATE, INPUT", ""),
     "AMPLITUDE": (
@@ -196,7 +200,6 @@ _REFUSED = {
     "DASHPOT": "dashpots are not available; use *DAMPING of the material",
     "CONNECTOR SECTION": "connectors are not available; hold or load the bodies themselves",
     "DISTRIBUTING COUPLING": "write *COUPLING with *DISTRIBUTING",
-    "KINEMATIC COUPLING": "write *COUPLING with *KINEMATIC",
     "EMBEDDED ELEMENT": "embedded elements are not available; mesh them into the body",
     "PRE-TENSION SECTION": "prescribe the displacement of the bolt's end instead",
     "SUBMODEL": "prescribe the boundary's displacements by *BOUNDARY",

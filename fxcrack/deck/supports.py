@@ -242,6 +242,21 @@ class Boundary:
             )
         return self.track(entries)
 
+    def share(self, nodes: Ints, others: Ints) -> int:
+        """Prescribe displacements of other nodes, where they are free, as those of nodes are.
+
+        Args:
+            nodes: The nodes, shape (n,).
+            others: One for each, shape (n,).
+
+        Returns:
+            For how many of them something is new.
+        """
+        theirs, ours = self.owner[:, :3, others], self.owner[:, :3, nodes]
+        new = (theirs < 0) & (ours >= 0)
+        self.owner[:, :3, others] = np.where(new, ours, theirs)
+        return int(new.any(axis=(0, 1)).sum())
+
     def release(self, node: int, dofs: Sequence[int]) -> None:
         """Leave it to a constraint to prescribe some components of a node."""
         self.owner[:, list(dofs), node] = -1

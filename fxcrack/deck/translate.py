@@ -50,7 +50,16 @@ _IN_MODEL = frozenset(
     (
         *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
         *("DISTRIBUTING",),
-        *("EQUATION", "MPC", "RIGIDBODY", "CLEARANCE", "NODALENERGYRATE", "CONTROLS", *GENERAL),
+        *(
+            "EQUATION",
+            "MPC",
+            "KINEMATICCOUPLING",
+            "RIGIDBODY",
+            "CLEARANCE",
+            "NODALENERGYRATE",
+            "CONTROLS",
+            *GENERAL,
+        ),
     )
 )
 
@@ -125,6 +134,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         check_density(moving[0], sections, model)
     if explicit:
         check_explicit(moving[0], flat, sections, loads, temperatures, boundary)
+    if not explicit:
+        contacts.share_supports(boundary)
     constrained = constraints.supports(boundary, groups)
     if explicit:
         check_constraints(constrained, cards)

@@ -340,7 +340,8 @@ def _interface_rows(
         names = ", ".join(f"'{link.pair.title}'" for link in links)
         raise InterfaceError(
             f"interfaces {names} form a cycle: a slave node is master of a node that is in turn "
-            "its master; exchange slave and master of one of them"
+            "its master; exchange slave and master of one of them, or make one interface of "
+            "surfaces that continue each other, mesh.joined('whole', ['first', 'second'])"
         )
     composed = base
     for _ in range(len(links) if not len(joined[0]) else 2 * len(links) + 1):

@@ -26,10 +26,8 @@ import numpy as np
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.errors import InputError
 from fxcrack.base.sparse import add_multiple
 from fxcrack.base.timings import Timings
-from fxcrack.continuum.bulk_viscosity import BulkViscosity
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.inertia import Inertia
@@ -51,21 +49,13 @@ from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
+from fxcrack.solvers.explicit_present import PresentInterface
 from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
+from fxcrack.solvers.explicit_stability import Stability
 from fxcrack.solvers.explicit_state import Arrays, InterfaceSnapshot, MotionFiles, MotionSnapshot
 from fxcrack.solvers.explicit_supports import PrescribedMotion
 from fxcrack.solvers.options import ExplicitOptions
-from fxcrack.solvers.stable_increment import (
-    STEPS,
-    HighestFrequency,
-    chosen_increment,
-    damped_increment,
-    rounded_down,
-    start_vector,
-)
-
-_AGAIN = 6
-"""Lanczos steps that follow a tangent which has changed little."""
+from fxcrack.solvers.stable_increment import chosen_increment
 
 
 class ExplicitSolver:
@@ -90,6 +80,7 @@ class ExplicitSolver:
         energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
         dynamics: Motion and forces of the interfaces.
+        stability: The stable increment.
         further: Pressures that follow the bodies, bulk viscosity.
         dt: Increment, time.
         stable: Largest stable increment, time.
@@ -171,11 +162,9 @@ class ExplicitSolver:
         self.dynamics = InterfaceDynamics(lumped, self.pairs, bonded & ~sprung, elastic)
         self._mine = nodes.mine
         self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
-        self._bonds = np.zeros((lumped.n_rows + 1, gdim))
-        self._jumps = np.zeros((lumped.n_rows + 1, gdim))
+        self._present = PresentInterface(lumped, self.dynamics)
+        self.stability = Stability(self.bodies, self.dynamics, self.further, self._at_interface)
         self._at_nodes = np.zeros(gdim * len(nodes))
-        self._bonds_known = False
-        self._any_held = bool(lumped.held.any())
         self._has_face_loads = self._outer.take_faces(lumped)
         self.dynamics.v = nodes.gather(self._velocity)
 
@@ -207,8 +196,8 @@ class ExplicitSolver:
         start = clock.perf_counter()
         if self.mass.choose(options, self.bodies):
             self._take_mass()
-        self._take_viscosity(options)
-        self.stable = self._stable_increment()
+        self.energies.is_viscous |= self.stability.take_viscosity(options, self._effect)
+        self.stable = self.stability.find(self.mass.values, self.velocity)
         self.motion.prepare(self.mass.inverse)
         self._outer.divide(self._chosen, self.mass.inverse)
         self.dt = chosen_increment(options, self.stable)
@@ -222,50 +211,6 @@ class ExplicitSolver:
         lumped = self.lumped
         lumped.mass = lumped.nodes.gather(self.mass.values)[:, 0]
         self.dynamics.set_ties(lumped.tied)
-
-    def _stable_increment(self) -> float:
-        places = self.continuum.positions()[: self.continuum.layout.n_owned]
-        start = start_vector(places, self.continuum.gdim)
-        self._highest = HighestFrequency(self.comm, self.mass.values, start)
-        self._damping_rate = HighestFrequency(self.comm, self.mass.values, start)
-        return self._stable_by(STEPS)
-
-    def _stable_by(self, steps: int) -> float:
-        """The stable increment by some more Lanczos steps; collective."""
-        omega, viscosity = self._highest(self._tangent_product, steps), self.further.viscosity
-        rate = 0.0
-        if viscosity is not None:
-            viscosity.forces(self.velocity)
-            rate = self._damping_rate(viscosity.product, steps) ** 2
-        return rounded_down(damped_increment(omega, rate))
-
-    def _tangent_product(self, direction: Array) -> Array:
-        """Tangent of bodies and elastic bonds times a direction, owned dofs; collective."""
-        out = self.bodies.tangent_product(direction)
-        elastic, lumped = self.dynamics.elastic, self.lumped
-        if elastic.exist:
-            jumps = lumped.jumps(lumped.nodes.gather(direction))
-            forces = lumped.on_nodes(elastic.forces(jumps))
-            out[self._at_interface] -= forces[self._mine].ravel()
-        return out
-
-    def _take_viscosity(self, options: ExplicitOptions) -> None:
-        linear, quadratic = options.bulk
-        self.further.viscosity = None
-        if linear or quadratic:
-            if self.bodies.finite or self.continuum.shell_cells:
-                raise InputError(
-                    "Explicit: bulk viscosity is for solids of small strain: the volume change it "
-                    "counts is that of small rotations; leave bulk out"
-                )
-            self.further.viscosity = BulkViscosity(self.continuum, self._effect, linear, quadratic)
-        self.energies.is_viscous |= bool(linear or quadratic)
-
-    @property
-    def stable_changes(self) -> bool:
-        """Whether the stable increment changes as bodies move."""
-        viscosity = self.further.viscosity
-        return self.bodies.finite or (viscosity is not None and viscosity.changes)
 
     def follow_bodies(self) -> None:
         """Take front geometry and contact normals of bodies that move far; collective."""
@@ -282,7 +227,7 @@ class ExplicitSolver:
 
     def renew_stable_increment(self) -> float:
         """The stable increment with the present tangent, by a few more steps; collective."""
-        self.stable = self._stable_by(_AGAIN)
+        self.stable = self.stability.again(self.velocity)
         return self.stable
 
     def set_displacement(self, owned: Array) -> None:
@@ -346,52 +291,26 @@ class ExplicitSolver:
     def accelerate(self) -> None:
         """Motion of the interface nodes and the forces between them, with the present ties."""
         self.dynamics.accelerate(self._at_nodes, self._coordinates, self._h, self.dt)
-        self._bonds_known = False
+        self._present.forget()
 
     @property
     def bonds(self) -> Array:
         """Forces of the tied bonds on the slaves, shape (n_rows + 1, gdim), force."""
-        self._know_bonds()
-        return self._bonds
+        return self._present.bonds
 
     @property
     def jumps(self) -> Array:
         """Jumps of the open rows, shape (n_rows + 1, gdim), length."""
-        self._know_bonds()
-        return self._jumps
+        return self._present.jumps
 
     @property
     def face_loads(self) -> Array | None:
         """Loads on the slave side, shape (n_rows + 1, gdim), force; ``None``: there are none."""
         if not self._has_face_loads:
             return None
-        out = np.zeros_like(self._bonds)
+        out = np.zeros_like(self._present.jumps)
         out[:-1] = self._outer.on_faces(self._loads)
         return out
-
-    def _know_bonds(self) -> None:
-        """Find bond forces and jumps of all rows in the present increment."""
-        if self._bonds_known:
-            return
-        dynamics, lumped = self.dynamics, self.lumped
-        rows, forces = lumped.bond_forces(dynamics.a, dynamics.total)
-        if self._any_held:
-            forces = self._without_supports(rows, forces)
-        self._bonds[lumped.open] = 0.0
-        self._bonds[rows] = forces
-        self._jumps[lumped.open] = dynamics.gap
-        if dynamics.elastic.exist:
-            held = dynamics.elastic.rows
-            self._bonds[lumped.open] = dynamics.elastic.forces(dynamics.gap)
-            self._jumps[held] = 0.0
-        self._bonds_known = True
-
-    def _without_supports(self, rows: Ints, forces: Array) -> Array:
-        """Bond forces without the components that supports hold, which are their reactions."""
-        frames = self.lumped.frames[rows]
-        local = np.einsum("nci,nc->ni", frames, forces)
-        local[self.lumped.held[rows]] = 0.0
-        return np.asarray(np.einsum("nci,ni->nc", frames, local))
 
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
@@ -448,7 +367,7 @@ class ExplicitSolver:
         self.at += dt
         self.last_dt = dt
         self.increments += 1
-        self._bonds_known = False
+        self._present.forget()
         self.seconds["update"] += clock.perf_counter() - start
 
     def _of_elastic_bonds(self, dt: float) -> float:

@@ -20,6 +20,7 @@ from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
+from fxcrack.continuum.foundation import Stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import AmplitudeLike, Ramp
 from fxcrack.criteria.evaluator import TipValues
@@ -35,6 +36,9 @@ from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.force_ramps import ForceRamp, given_forces, still_pulling
+
+_ROUND_OFF = 1e-10
+"""Overlap of faces over the size of their facets that is round-off of coordinates."""
 
 
 @dataclass
@@ -104,6 +108,7 @@ class Analysis:
         ramps: Bonds whose force is released with time or over increments.
         fatigue: What cycles leave behind for later ones.
         started: Whether there is an equilibrium yet.
+        stabilise: The weak foundation of bodies, as the user gave it.
     """
 
     continuum: Continuum
@@ -119,6 +124,7 @@ class Analysis:
     ramps: list[ForceRamp] = field(default_factory=list)
     fatigue: FatigueState = field(default_factory=FatigueState)
     started: bool = False
+    stabilise: Stabilise | None = None
 
     # -- what it consists of -------------------------------------------------------------
 
@@ -200,6 +206,8 @@ class Analysis:
         solver = self.condensed
         system = solver.system
         overlap = np.where(system.contact, np.maximum(-system.gap, 0.0), 0.0)
+        size = max((pair.surface.facet_size for pair in self.pairs), default=0.0)
+        overlap[overlap <= _ROUND_OFF * size] = 0.0
         dynamic = any(isinstance(e, Inertia) for e in self.effects)
         if not dynamic and not overlap.any():
             return

@@ -63,7 +63,7 @@ class ExplicitDriver:
             for speed, passed in zip(self.speeds, resume["passed"], strict=True):
                 speed.passed = [(float(t), float(a)) for t, a in passed]
         self._follows = solver.bodies.finite
-        self._may_become_unstable = solver.stable_changes
+        self._may_become_unstable = solver.stability.changes
         self._good: tuple[Any, list[int], int] | None = None
         self._may_overlap = np.zeros(solver.lumped.n_rows, dtype=bool)
         for pair, rows in zip(solver.pairs, solver.row_of, strict=True):
