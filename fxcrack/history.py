@@ -1,8 +1,9 @@
 """The history of an analysis: a table with one row per event, and how it is written.
 
-Events: start and end of a step; "onset" (f = 1, just before a release; not in increment stepping),
-"release" (just after), "bend" (an amplitude changes its slope, in event stepping: everything is
-linear in time between rows), "snap" (cohesive bonds have run through unstable states), "increment".
+Events: start and end of a step; "onset" (just before a release, at f = 1, or above 1 in unstable
+growth, where more nodes go at one load; not in increment stepping), "release" (just after), "bend"
+(an amplitude changes its slope, in event stepping: everything is linear in time between rows),
+"snap" (cohesive bonds have run through unstable states), "increment".
 
 Columns (brackets hold the name of a support, load, monitor or interface):
 time, event, u[..] and R[..] prescribed displacement and reaction, F[..] and v[..] load factor and
@@ -38,6 +39,8 @@ from fxcrack.base.parallel import all_or_none
 Row = dict[str, float | int | str]
 
 
+_AT_ONE = 1e-6
+"""How far from 1 f may be at an onset that counts as one at f = 1."""
 _FORMER_DETAILS = {"window": "retained"}
 """Former names of details; they are removed in the next release."""
 
@@ -231,6 +234,14 @@ class History:
                 f"crack {title}: length from {a[0]:.6g} to {a[-1]:.6g}, "
                 f"{int(released[-1])} nodes released"
             )
+            f = self[f"f[{title}]"].astype(float) if f"f[{title}]" in names else np.zeros(len(a))
+            onset = self["event"] == "onset"
+            above = int(np.count_nonzero(onset & (f > 1.0 + _AT_ONE)))
+            if above:
+                lines.append(
+                    f"  unstable growth: f is above 1 at {above} of {int(onset.sum())} onsets, "
+                    f"up to {float(f[onset & (f > 1.0)].max()):.3g}"
+                )
             grown = np.flatnonzero(np.diff(released.astype(float)) > 0.0)
             if len(grown):
                 lines.append(f"  began to grow at time {float(self.rows[grown[0]]['time']):.6g}")

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from fxcrack.base import log
 from fxcrack.base.checks import (
     check_amplitudes,
     check_instance,
@@ -189,6 +190,13 @@ def compose(given: SceneInput) -> Analysis:
         )
         for one in given.interfaces
     ]
+    for debond in given.debonds:
+        if debond.interface.bonded is None:  # a tie, which no criterion lets go, needs no tip
+            log.warn(
+                "interface '%s': no bonded set given; the whole pair is bonded and has no crack "
+                "tip",
+                debond.interface.title,
+            )
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)

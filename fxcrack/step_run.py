@@ -18,7 +18,7 @@ from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.set_motions import warn_of_turns
-from fxcrack.interface.supports import warn_of_held_bonds
+from fxcrack.interface.supports import tell_of_held_bonds
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.explicit import ExplicitSolver
@@ -208,7 +208,7 @@ def _prepare(
         restarts.put_in_equilibrium()
     elif not analysis.started:
         for pair, held in zip(analysis.pairs, solver.held_by_supports, strict=True):
-            warn_of_held_bonds(pair, held)
+            tell_of_held_bonds(pair, held)
         solver.start()
         analysis.book_start()
     analysis.started = True

@@ -97,7 +97,15 @@ def _linear(largest: npt.ArrayLike, final: float) -> Array:
 
 @dataclass(frozen=True)
 class StepRelease(ReleaseLaw):
-    """The whole force is removed in the increment that follows debonding."""
+    """The whole force is removed in the increment that follows debonding.
+
+    On a front in 3-D this loses energy: a single node that runs ahead of its neighbours is released
+    when its own f is 1, and the energy set free per area stays below the toughness. A double
+    cantilever beam 20 wide with elements of 1 x 2 carries 14 % less load at the same opening than
+    corrected beam theory, whatever the spacing across; with :class:`ProgressiveRelease` it is
+    1.7 % more, of which the bending stiffness of first-order elements is the most (demo
+    ``front3d``). In 2-D the load at every onset is right.
+    """
 
     driver: ClassVar[Driver] = "once"
 

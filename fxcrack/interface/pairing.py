@@ -344,7 +344,6 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
     chosen = interface.bonded
     where = f"interface '{interface.title}'"
     if chosen is None:
-        log.warn("%s: no bonded set given; the whole pair is bonded and has no crack tip", where)
         return np.ones(surface.n_nodes, dtype=bool)
     if isinstance(chosen, str):
         owned = continuum.owned_nodes(chosen).astype(np.int32)

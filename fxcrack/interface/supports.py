@@ -253,11 +253,11 @@ def _share_at_joints(
     which[dofs], value[dofs] = column[mine], wanted[mine]
 
 
-def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
-    """Warn where supports on both faces keep bonds from ever opening.
+def tell_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
+    """Say, as information, where supports on both faces keep bonds from ever opening.
 
-    Supports that only stop faces from sliding (planes of symmetry, axes) are the usual case and
-    need no warning.
+    A clamped end is the usual case. Supports that only stop faces from sliding (planes of symmetry,
+    axes) are not mentioned.
 
     Args:
         pair: Interface.
@@ -265,7 +265,7 @@ def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
     """
     fixed = np.flatnonzero(held[:, 0] & pair.bonded)
     if len(fixed):
-        log.warn(
+        log.info(
             "interface '%s': supports hold both faces at %d of its bonded nodes, one of them at "
             "%s; those bonds cannot open and show no force",
             pair.title,

@@ -33,8 +33,10 @@ class Debond:
     Args:
         interface: Where.
         criterion: When.
-        release: How the bond force goes to zero; by default at once, in an
-            :class:`fxcrack.Explicit` step progressively.
+        release: How the bond force goes to zero; by default at once (:class:`StepRelease`), in an
+            :class:`fxcrack.Explicit` step progressively. In 3-D prefer
+            :class:`ProgressiveRelease` unless friction excludes it: see :class:`StepRelease` for
+            what releasing at once costs there.
         temperature: Temperature of the interface, a number or a function of positions of shape
             (3, n), for toughness, strength or critical opening tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.

@@ -200,7 +200,8 @@ def why_ended(analysis: Analysis, ends: Sequence[Until], end_time: float) -> str
     if analysis.active and not any(len(v.tips) for v in analysis.tip_values):
         if end_time < LARGE and analysis.time < end_time:
             return ""
-        return "no crack tip is left"
+        opened = all(not g.front.bonded.any() for g in analysis.active)
+        return "total separation: no crack tip is left" if opened else "no crack tip is left"
     return ""
 
 

@@ -10,7 +10,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
-from fxcrack.interface.supports import warn_of_held_bonds
+from fxcrack.interface.supports import tell_of_held_bonds
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis
@@ -71,7 +71,7 @@ def prepare_explicit(
     assert isinstance(solver, ExplicitSolver)
     if not analysis.started:
         for pair, held in zip(analysis.pairs, solver.held_by_supports, strict=True):
-            warn_of_held_bonds(pair, held)
+            tell_of_held_bonds(pair, held)
     now = analysis.loads_at(analysis.time)
     solver.prepare(step.options, may_grow, now)
     if resumes:

@@ -254,6 +254,12 @@ def _curves_have_ended(driver: StepDriver) -> bool:
 def _never(driver: StepDriver) -> str:
     """Why the load was raised in vain."""
     analysis, breaks = driver.analysis, driver.breaks
+    if _only_round_off(driver):
+        left = sum(int(g.front.bonded.sum()) for g in analysis.active)
+        return (
+            f"total separation but for {left} bonded node{'s' * (left > 1)}, about which the "
+            f"bodies turn freely: {_NEVER}"
+        )
     if not np.any(analysis.loads_at(analysis.time + 1.0)):
         return "no load acts in this step and no support moves, so the criterion is not reached"
     last = max([analysis.time, *breaks])
