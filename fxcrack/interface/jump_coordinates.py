@@ -59,6 +59,7 @@ from scipy.sparse.csgraph import connected_components
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
@@ -292,7 +293,7 @@ def _interface_rows(
             "its master; exchange slave and master of one of them"
         )
     composed = base
-    for _ in range(len(links)):
+    for _ in range(links_in_chain(link.pair.hierarchy for link in links)):
         composed = base + chain @ composed
     return sp.csr_matrix(composed)
 
