@@ -18,6 +18,10 @@ test-slow: $(ready) ## the others: verification, convergence, hard cases, and th
 
 test-all: test test-slow ## both
 
+SEEDS ?= 0:500
+random: $(ready) ## random scenes by seed, SEEDS=0:500, and the table of what they hold to
+	.venv/bin/python tests/stability/random_scenes.py $(SEEDS) --table docs/combinations.md
+
 lint: $(ready) ## style, format, types
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
@@ -41,4 +45,4 @@ distclean: clean ## remove the environment too
 $(ready): pyproject.toml .ci/bootstrap
 	.ci/bootstrap
 
-.PHONY: help demo smoke test test-slow test-all lint docs bench clean distclean
+.PHONY: help demo smoke random test test-slow test-all lint docs bench clean distclean

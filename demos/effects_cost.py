@@ -2,7 +2,8 @@
 #
 # One specimen, a double cantilever beam that grows its crack by a few millimetres, from the bare
 # linear scene upwards: each rung names one effect more. An effect that is not named has no form
-# term, no unknown and no second in the table. Units N, mm, MPa.
+# term, no unknown and no second in the table. A second table has the same beam as solids, continuum
+# shells and shells. Units N, mm, MPa.
 """The ladder of cost: a bare linear scene, then one effect after the other."""
 
 from __future__ import annotations
@@ -15,6 +16,8 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.accuracy.bending import strip_dcb
+from fxcrack.accuracy.study import Setting
 from fxcrack.demos.show import arguments, table
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.output.explain import explain
@@ -68,8 +71,43 @@ def run(dx: float = 0.5, ny: int = 4, until: float = 33.0) -> list[tuple[str, fl
     return out
 
 
+# ## The bodies
+#
+# The same beam as a strip in 3-D, under a unit load: solids, continuum shells and shells, at small
+# strain and at large rotation.
+BODIES = (
+    Setting(size=2.5, order=1, cell="hexahedron"),
+    Setting(size=2.5, order=2, cell="hexahedron"),
+    Setting(size=2.5, order=1, cell="continuum shell"),
+    Setting(size=2.5, order=2, cell="continuum shell"),
+    Setting(size=2.5, order=1, cell="shell"),
+    Setting(size=2.5, order=2, cell="shell"),
+)
+
+
+def run_bodies() -> list[tuple[str, int, float, float]]:
+    """Kind of cells, unknowns, seconds of the linear scene and of the one with large rotation."""
+    out = []
+    for setting in BODIES:
+        seconds = []
+        unknowns = 0
+        for effects in ([], [fx.FiniteStrain()]):
+            for _ in ("forms are compiled", "counted"):
+                case = strip_dcb(setting)
+                scene = case.scene.rebuilt(effects=effects)
+                start = time.perf_counter()
+                scene.run(fx.Static(until=fx.Time(1.0), initial=1.0), progress=False)
+                took = time.perf_counter() - start
+                unknowns = scene.continuum.n_global
+                scene.close()
+                case.scene.close()
+            seconds.append(took)
+        out.append((setting.title, unknowns, *seconds))
+    return out
+
+
 def main(out: Path, fine: bool = False) -> None:
-    """The table and the picture."""
+    """The tables and the picture."""
     ladder = run(0.25, 8) if fine else run()
     bare = ladder[0][1]
     rows = [
@@ -88,6 +126,12 @@ def main(out: Path, fine: bool = False) -> None:
         "Seconds of one specimen with one effect more",
         ["effect", "s", "over bare", "solver", "form terms", "factorisations", "jumps"],
         rows,
+    )
+
+    table(
+        "Seconds of one strip as solids and shells, cells of 2.5 mm",
+        ["cells", "unknowns", "s, small strain", "s, large rotation"],
+        [[name, f"{n:,}", *took] for name, n, *took in run_bodies()],
     )
 
     def draw() -> Figure:

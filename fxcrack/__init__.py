@@ -9,13 +9,14 @@ from fxcrack.base.errors import EnergyError, FxcrackError, InputError
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
+from fxcrack.continuum.amplitudes import Amplitude, Integral, Ramp, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.loads import (
-    Amplitude,
     BodyForce,
     Displacement,
     Moment,
@@ -23,8 +24,8 @@ from fxcrack.continuum.loads import (
     PointForce,
     PointMoment,
     Pressure,
-    Ramp,
     Traction,
+    constant,
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
@@ -131,6 +132,7 @@ __all__ = [
     "Clamp",
     "CondensedOptions",
     "ContinuumShell",
+    "Coupling",
     "CrackLength",
     "CrackLengthVsTime",
     "CrackOpening",
@@ -145,6 +147,7 @@ __all__ = [
     "Elber",
     "EnergyError",
     "EnhancedVCCT",
+    "Equation",
     "Evaluator",
     "Explicit",
     "Face",
@@ -157,6 +160,7 @@ __all__ = [
     "History",
     "Inertia",
     "InputError",
+    "Integral",
     "Interface",
     "Interrupted",
     "Isotropic",
@@ -189,6 +193,7 @@ __all__ = [
     "Scene",
     "Section",
     "Shell",
+    "SmoothStep",
     "Solid",
     "Split",
     "Static",
@@ -202,6 +207,7 @@ __all__ = [
     "Walker",
     "bond_table",
     "checkpoints",
+    "constant",
     "displacement_function",
     "from_dolfinx",
     "front_lines",

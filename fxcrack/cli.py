@@ -337,8 +337,8 @@ def accuracy(
     scene: Annotated[
         str,
         typer.Argument(
-            help="dcb, enf, mmb, penny, fatigue_dcb, or path/to/file.py:function, or "
-            "package.module:function."
+            help="dcb, enf, mmb, penny, fatigue_dcb, strip_dcb (_enf, _slb, _mmb), or "
+            "path/to/file.py:function, or package.module:function."
         ),
     ],
     budget: Annotated[float, typer.Option(help="Seconds all runs together may take.")] = 60.0,

@@ -13,6 +13,7 @@ from typing import Any
 
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.conserving import conserving
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
@@ -26,7 +27,9 @@ from fxcrack.continuum.temperature import Temperature, expansion_of
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.continuum.tied_elastic import TiedElastic
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.crack_pressure import CrackPressure
+from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.supports import Supports
 from fxcrack.solvers.plan import SOLVERS, Plan
 
 
@@ -86,10 +89,8 @@ def _follows(load: Load) -> bool:
     return isinstance(load, Pressure) and load.follows
 
 
-def _check_shells(effects: Sequence[Any], loads: Sequence[Load]) -> None:
+def _check_shells(loads: Sequence[Load]) -> None:
     """Refuse what shells cannot have."""
-    if any(isinstance(e, Inertia) for e in effects):
-        raise InputError("Inertia is not possible in shells; use ContinuumShell or solids")
     for load in filter(_follows, loads):
         raise InputError(
             f"pressure '{load.title}': a pressure on a shell keeps its direction; leave out follows"
@@ -119,7 +120,7 @@ def plan(
     forms = _forms(continuum)
     finite = _is_finite(forms, effects)
     if isinstance(continuum, ShellBodies):
-        _check_shells(effects, loads)
+        _check_shells(loads)
     if finite and "plastic" in forms:
         raise InputError(
             "Plastic is a law for small strain and cannot stand beside finite strain; leave out "
@@ -136,6 +137,14 @@ def plan(
     for load in filter(_follows, loads):
         on.append(f"follower pressure '{load.title}'")
         why.append(f"pressure '{load.title}' follows the bodies")
+    for load in loads:
+        if isinstance(load, Pressure) and load.follows_crack:
+            on.append(f"pressure '{load.title}' on the faces of a crack as they open")
+            if finite:
+                raise InputError(
+                    f"pressure '{load.title}': follows_crack is for small strain; leave out "
+                    "FiniteStrain() and NeoHookean"
+                )
     if continuum.temperature is not None:
         if not any(
             hasattr(m, "temperatures") or expansion_of(m).any() for m in continuum.part_materials
@@ -184,16 +193,26 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     terms += [
         FollowerPressure(continuum, x) for x in loads if isinstance(x, Pressure) and x.follows
     ]
-    terms += [InertiaForces(continuum, e) for e in effects if isinstance(e, Inertia)]
+    for effect in (e for e in effects if isinstance(e, Inertia)):
+        terms = [*conserving(continuum, terms, effect), InertiaForces(continuum, effect)]
     return terms
 
 
-def dead_loads(continuum: Continuum, loads: Sequence[Load], solver: str) -> list[Any]:
+def dead_loads(
+    continuum: Continuum,
+    loads: Sequence[Load],
+    solver: str,
+    pairs: Sequence[Pair],
+    supports: Supports,
+) -> list[Any]:
     """The loads that are force patterns: those that follow the bodies are terms instead.
 
     For the linear solver the temperature is a force pattern too.
     """
     out: list[Any] = [x for x in loads if not _follows(x)]
+    for i, load in enumerate(out):
+        if isinstance(load, Pressure) and load.follows_crack:
+            out[i] = CrackPressure.of(load, pairs, continuum, supports)
     if continuum.temperature is not None and solver == "linear":
         out += thermal_loads(continuum)
     return out

@@ -20,6 +20,7 @@ from fxcrack.history import History, Row
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
+from fxcrack.steps.element_growth import cyclic_parts
 from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.static import Static
 
@@ -194,7 +195,10 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
     more = _MORE if order == 1 else 1.0
     life = None
     if cycles:
-        exponents = [abs(d.criterion.life_exponent) for d in grow]
+        exponents = [
+            abs(g.criterion.life_exponent(float(cyclic_parts(g)[1].toughness[:, 0].mean())))
+            for g in analysis.active
+        ]
         life = (1.0 + more * rate) ** max(exponents, default=0.0) - 1.0
     return Estimate(
         load=more * load,

@@ -45,9 +45,15 @@ _FORMER_DETAILS = {"window": "retained"}
 class Details(dict[str, Any]):
     """What else is worth keeping with a history, by name; former names warn."""
 
+    def get(self, name: str, default: Any = None) -> Any:
+        """The detail of a name, also of a former one; ``default`` where there is none."""
+        if name in self or _FORMER_DETAILS.get(name) in self:
+            return self[name]
+        return default
+
     def __missing__(self, name: str) -> Any:
         if name not in _FORMER_DETAILS:
-            raise KeyError(name)
+            raise KeyError(f"{name}; known: {', '.join(self)}")
         new = _FORMER_DETAILS[name]
         warnings.warn(
             f"details['{name}'] is now called details['{new}']; the former name will be removed",

@@ -16,6 +16,8 @@ from fxcrack.base.errors import InputError
 from fxcrack.base.together import check_same_call, in_collective_call
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint
+from fxcrack.continuum.foundation import Stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Model, Shell
 from fxcrack.continuum.loads import Displacement, Load, Monitor
@@ -44,7 +46,7 @@ from fxcrack.steps.debond import Debond, check_friction
 from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_interfaces, warn_of_step_release
+from fxcrack.steps.explicit_rules import check_interfaces, check_start, warn_of_step_release
 from fxcrack.steps.explicit_setup import start_from, use_explicit_solver
 from fxcrack.steps.rows import Observer
 from fxcrack.steps.static import Static
@@ -57,7 +59,7 @@ class Scene:
         mesh: Mesh with named groups.
         materials: One material (a :class:`Section` of shells), or one per cell group.
         model: Kinematic model.
-        supports: Prescribed displacements.
+        supports: Prescribed displacements, rigid couplings and linear equations.
         loads: Force patterns.
         debonds: Interfaces that may come apart, with their criterion.
         bonds: Interfaces that stay as they are (bonded parts tied, open parts open).
@@ -69,6 +71,11 @@ class Scene:
         solver: "newton" sends a scene without such effects through the nonlinear solver all the
             same; by default the effects decide between it and "linear".
         newton: Controls of the nonlinear solver, where it is used.
+        stabilise: A weak foundation under bodies that only contact holds, so that an equilibrium
+            exists before faces touch: a small number s, or one for each of some cell groups. Its
+            stiffness per volume is s c/L^2, c the largest modulus of the materials and L the size
+            of the group. Its energy is the column ``stabilising_energy``; a warning says where it
+            is more than 1 % of the strain energy.
         path: Former name of ``solver``, deprecated; "condensed" stands for "linear".
 
     Attributes:
@@ -85,7 +92,7 @@ class Scene:
         *,
         materials: Material | Section | Mapping[str, Material] | Mapping[str, Section],
         model: Model | Shell,
-        supports: Sequence[Displacement | Support] = (),
+        supports: Sequence[Displacement | Support | Constraint] = (),
         loads: Sequence[Load] = (),
         debonds: Sequence[Debond] = (),
         bonds: Sequence[Interface] = (),
@@ -95,6 +102,7 @@ class Scene:
         effects: Sequence[Any] = (),
         solver: str | None = None,
         newton: NewtonOptions | None = None,
+        stabilise: Stabilise | None = None,
         path: str | None = None,
     ) -> None:
         self._n_warned = log.n_warned()
@@ -112,6 +120,7 @@ class Scene:
             effects=effects,
             solver=solver if path is None else solver_of_path(path, solver),
             newton=newton,
+            stabilise=stabilise,
         )
         given = {f.name: getattr(self.input, f.name) for f in fields(self.input)}
         check_same_call(
@@ -300,9 +309,9 @@ class Scene:
         check_interfaces(chosen, given.bonds)
         others = [e for e in given.effects if not isinstance(e, Inertia)]
         begins = not isinstance(self.solver, ExplicitSolver)
-        use_explicit_solver(
-            self.analysis, given.loads, lambda c: form_terms(c, others, given.loads)
-        )
+        if begins and step.start == "equilibrium":
+            check_start(self.continuum, given.interfaces)
+        use_explicit_solver(self.analysis, lambda c: form_terms(c, others, given.loads))
         warn_of_step_release(chosen)
         if begins and step.start == "equilibrium":
             still = self.rebuilt(effects=others)

@@ -19,6 +19,8 @@ from fxcrack.base.checks import (
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint, Coupling, Equation
+from fxcrack.continuum.foundation import Foundation, Stabilise, check_stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import (
     Axisymmetric,
@@ -71,7 +73,7 @@ class SceneInput:
     mesh: Mesh
     materials: Material | Section | Mapping[str, Material] | Mapping[str, Section]
     model: Model | Shell
-    supports: Sequence[Displacement | Support] = ()
+    supports: Sequence[Displacement | Support | Constraint] = ()
     loads: Sequence[Load] = ()
     debonds: Sequence[Debond] = ()
     bonds: Sequence[Interface] = ()
@@ -81,6 +83,7 @@ class SceneInput:
     effects: Sequence[Any] = ()
     solver: str | None = None
     newton: NewtonOptions | None = None
+    stabilise: Stabilise | None = None
 
     def __post_init__(self) -> None:
         """Check kinds and names."""
@@ -92,7 +95,7 @@ class SceneInput:
             (PlaneStrain, PlaneStress, Axisymmetric, Solid, Shell),
             "Solid()",
         )
-        self._take_list("supports", (Displacement, Clamp, Symmetry, Rotation))
+        self._take_list("supports", (Displacement, Clamp, Symmetry, Rotation, Coupling, Equation))
         self._take_list("loads", (Traction, Pressure, BodyForce, PointForce, Moment, PointMoment))
         check_amplitudes([*self.supports, *self.loads])
         warn_of_same_titles("loads", self.loads)
@@ -115,6 +118,8 @@ class SceneInput:
             )
         self._check_materials()
         text("Scene", "solver", self.solver, optional=True)
+        if self.stabilise is not None:
+            check_stabilise(self.stabilise)
         titles = [i.title for i in self.interfaces]
         for title in titles:
             if titles.count(title) > 1:
@@ -189,16 +194,18 @@ def compose(given: SceneInput) -> Analysis:
     warn_of_locking(continuum, pairs[: len(given.debonds)])
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
-    loads = dead_loads(continuum, given.loads, chosen.solver)
+    loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
     parts = continuum, pairs, supports, loads, list(given.monitors)
+    foundation = None if given.stabilise is None else Foundation(continuum, given.stabilise)
     solver: Solver
     if chosen.solver == "linear":
-        solver = LinearSolver(*parts, given.options or CondensedOptions())
+        solver = LinearSolver(*parts, given.options or CondensedOptions(), foundation)
     else:
+        terms = form_terms(continuum, given.effects, given.loads)
         solver = NewtonSolver(
             *parts,
             given.options or CondensedOptions(rows=0.0),
-            bodies=WeakForm(continuum, form_terms(continuum, given.effects, given.loads)),
+            bodies=WeakForm(continuum, terms + ([foundation] if foundation else [])),
             newton=given.newton or NewtonOptions(),
         )
     return Analysis(
@@ -209,6 +216,7 @@ def compose(given: SceneInput) -> Analysis:
         list(given.effects),
         History(given.mesh.comm),
         EnergyBalance(),
+        stabilise=given.stabilise,
     )
 
 

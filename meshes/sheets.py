@@ -1,17 +1,21 @@
 """Surface meshes in space for shells: sheets given by a map from two coordinates.
 
-Every sheet has nodes of its own, so that sheets bonded to each other are an interface. Cells and
+Every sheet has nodes of its own, so that sheets bonded to each other are an interface, or they are
+joined where their nodes are at one place. Cells and
 nodes run along the first coordinate first.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Mesh
@@ -56,12 +60,15 @@ def sheets(
     *,
     cell: str = "quadrilateral",
     order: int = 1,
+    joined: bool = False,
     name: str = "sheets",
 ) -> Mesh:
     """One mesh of several sheets; collective.
 
     Args:
         parts: The sheets.
+        joined: Sheets meet where nodes of theirs are at one place (L and T joints of frames and
+            stringers); otherwise only interfaces connect them.
         comm: Communicator to distribute the mesh over.
         cell: quadrilateral or triangle.
         order: 1, or 2 (quadrilaterals).
@@ -90,9 +97,25 @@ def sheets(
             cell, order, np.concatenate(points), np.concatenate(cells), raw.cell_groups, raw.groups
         )
         check_shapes(found)
-        return found
+        return _merged(found) if joined else found
 
     return distribute(on_root(comm, make), comm, name)
+
+
+def _merged(raw: RawMesh) -> RawMesh:
+    """The same mesh with one node at each place."""
+    size = float(np.ptp(raw.points, axis=0).max())
+    near = KDTree(raw.points).query_pairs(_ON_GRID * size, output_type="ndarray")
+    n = len(raw.points)
+    graph = coo_array((np.ones(len(near), dtype=np.int8), (near[:, 0], near[:, 1])), (n, n))
+    _, place = connected_components(graph, directed=False)
+    _, first, number = np.unique(place, return_index=True, return_inverse=True)
+    return replace(
+        raw,
+        points=raw.points[first],
+        cells=number[raw.cells],
+        groups={name: replace(g, rows=number[g.rows]) for name, g in raw.groups.items()},
+    )
 
 
 def _grid(part: Sheet, cell: str, order: int, n: int, raw: RawMesh) -> tuple[Floats, Ints]:

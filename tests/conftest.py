@@ -167,6 +167,28 @@ def pytest_pycollect_makeitem(
     return made
 
 
+@pytest.hookimpl(trylast=True)  # after those that -m leaves out
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """With FXCRACK_TEST_SPREAD, leave parameters of a test in turn to the run on 2 or on 3 ranks.
+
+    Every test then still runs on both, each of its parameters on one of them. What bears the mark
+    "each" is not spread.
+    """
+    if "FXCRACK_TEST_SPREAD" not in os.environ or WORLD.size not in (2, 3):
+        return
+    tests: dict[str, list[pytest.Item]] = {}
+    for item in items:
+        tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
+    left = [
+        item
+        for same in tests.values()
+        for i, item in enumerate(same)
+        if len(same) > 1 and i % 2 != WORLD.size % 2 and not item.get_closest_marker("each")
+    ]
+    config.hook.pytest_deselected(items=left)
+    items[:] = [item for item in items if item not in left]
+
+
 def pytest_collection_finish(session: pytest.Session) -> None:
     gc.freeze()  # collections between tests need not visit what the imports made
     names = [item.nodeid for item in session.items]

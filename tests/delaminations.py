@@ -38,6 +38,7 @@ def strip(
     per_ply: int = 0,
     enf: bool = False,
     lever: float | None = None,
+    order: int = 2,
 ) -> fx.Scene:
     """A strip 1 wide, x along, y upwards, cracked for x < a; unit load down at mid-span.
 
@@ -57,7 +58,7 @@ def strip(
 
     def make() -> Blocks:
         model, above, below = two_bodies(
-            (x, x), (lines[0], lines[1]), (np.array([0.0, 1.0]),), cell="hexahedron", order=2
+            (x, x), (lines[0], lines[1]), (np.array([0.0, 1.0]),), cell="hexahedron", order=order
         )
         model.group("load", above.part(x=half_span, y=float(lines[0][-1])))
         model.group("lifted", above.part(x=0.0, y=float(lines[0][-1])))

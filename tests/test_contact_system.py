@@ -17,6 +17,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fxcrack.base.errors import ConvergenceError
+from fxcrack.equilibrium import growing_cholesky, jump_system
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, work_between
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 
@@ -120,6 +121,33 @@ def test_contact_is_optimal(seed: int) -> None:
     for _ in range(3):
         state = system.equilibrium(rng.standard_normal(4), force)
         assert_optimal(structure, system, state)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_contact_is_optimal_in_pieces(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """Components are freed some at a time, products are of whole rows; nothing else changes."""
+    rng = np.random.default_rng(seed)
+    structure = Structure.random(12, seed)
+    loads = rng.standard_normal(4)
+    expected = opened(structure, np.random.default_rng(seed), 8).equilibrium(loads, np.zeros(12))
+    for module in (growing_cholesky, jump_system):
+        monkeypatch.setattr(module, "AT_ONCE", 2)
+    system = opened(structure, np.random.default_rng(seed), 8)
+    state = system.equilibrium(loads, np.zeros(12))
+    assert_optimal(structure, system, state)
+    assert state.jump == pytest.approx(expected.jump, abs=ROUND_OFF)
+
+
+def test_what_was_freed_in_pieces_is_held_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The last component is held by nothing: those before it are not free either."""
+    schur = np.array([[1.0, -1.0, 0.5], [-1.0, 1.0, -0.5], [0.5, -0.5, 1.0]])
+    monkeypatch.setattr(jump_system, "AT_ONCE", 1)
+    system = ContactSystem(schur, 2, 1, 0)
+    with pytest.raises(NotPositiveDefinite):
+        system.release(np.array([0, 1]))
+    assert not system.free.any() and not len(system.cholesky)
+    system.release(np.array([0]))
+    assert system.equilibrium(np.ones(1), np.zeros(2)).jump[0] == -0.5
 
 
 @settings(max_examples=40)

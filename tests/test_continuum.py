@@ -15,9 +15,10 @@ from specimens import gathered, gathered_vector
 import fxcrack as fx
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.bordered_matrix import load_and_monitor_vectors
+from fxcrack.continuum.amplitudes import constant
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.load_vectors import load_vector
-from fxcrack.continuum.loads import Load, constant
+from fxcrack.continuum.loads import Load
 from fxcrack.continuum.materials import strain_rotation
 from fxcrack.continuum.stress import cell_stress, von_mises
 from fxcrack.mesh import Mesh

@@ -63,6 +63,20 @@ def test_one_cell_per_arm(case: str) -> None:
     scene.close()
 
 
+@pytest.mark.parametrize(
+    ("case", "lack", "share"),
+    [("equal", -0.048, 0.351), ("thin above", -0.040, 0.406), ("notched", -0.082, 1.0)],
+)
+def test_first_order(case: str, lack: float, share: float) -> None:
+    """One cell of first order per arm, 1 long: what plates lack, no root correction in mode II."""
+    (upper, lower), options = CASES[case]
+    scene = strip(upper, lower, dx=1.0, order=1, **options)
+    total, second = rates(scene)
+    assert total / SOLIDS[case][0] - 1.0 == pytest.approx(lack, abs=3e-3)
+    assert second == pytest.approx(share, abs=5e-3)
+    scene.close()
+
+
 @pytest.mark.quick("42.0-0.02")
 @pytest.mark.parametrize(("lever", "total_lack"), [(30.0, 0.028), (42.0, 0.020), (80.0, 0.012)])
 def test_mixed_mode_bending(lever: float, total_lack: float) -> None:

@@ -307,3 +307,35 @@ def test_a_pressure_under_large_rotations(tmp_path):
         read(tmp_path, text.format("*DLOAD\nUPPER, P, 1.\n"))
     (load,) = read(tmp_path, text.format("*DLOAD, FOLLOWER=NO\nUPPER, P, 1.\n")).arguments["loads"]
     assert load.where == fx.Face("UPPER", "bottom") and not load.follows
+
+
+def test_shells_that_meet_at_common_nodes(tmp_path):
+    """The tip of an upright at the end of a strip, pushed along the strip, over frame theory."""
+    upright = """*NODE
+211, 10., 0., 1.
+220, 10., 0., 10.
+311, 10., 1., 1.
+320, 10., 1., 10.
+*NGEN, NSET=C
+211, 220
+*NGEN, NSET=D
+311, 320
+*ELEMENT, TYPE=S4R
+21, 11, 211, 311, 111
+22, 211, 212, 312, 311
+*ELGEN, ELSET=WEB
+21
+22, 9, 1, 1
+*NSET, NSET=END
+220, 320
+"""
+    text = STRIP.replace("*NSET, NSET=ROOT", upright + "*NSET, NSET=ROOT", 1)
+    section = PLAIN + "\n*SHELL SECTION, ELSET=WEB, MATERIAL=PLAIN\n0.2, 5"
+    text = text.replace("NODE PRINT, NSET=TIP", "NODE PRINT, NSET=END")
+    deck = fx.read_deck(
+        write(tmp_path, text.format(section=section, load="*CLOAD\nEND, 1, 0.5E-3"))
+    )
+    found = deck.run().rows[-1]["m[U1 END]"]
+    deck.scene.close()
+    exact = 1e-3 * ((1.0 / 3.0 + 1.0) * 10.0**3 / EI + 10.0 / GA + 10.0 / 200.0)
+    assert found == pytest.approx(exact, rel=4e-3)  # ten elements a side

@@ -157,7 +157,11 @@ def test_large_rotations_friction_and_ties(tmp_path):
         ({"step": fx.Cycles(maximum=1.0, ratio=0.1)}, "without a period that begins at time 0"),
         ({"criterion": fx.VCCT(0.2, method="closure")}, "method='closure'"),
         ({"release": fx.ProgressiveRelease()}, "the release law ProgressiveRelease"),
-        ({"interface": {"pairing": "node-to-surface"}}, "pairing='node-to-surface'"),
+        ({"supports": [fx.Coupling("end_upper", (0.0, 0.0), x=1.0, mean=True)]}, "mean motion"),
+        (
+            {"supports": [fx.Equation((("pin_top", "x", 1.0), ("pin_bottom", "x", 1.0)), 1.0)]},
+            "equation 'pin_top' with a value",
+        ),
         (
             {
                 "criterion": fx.Fatigue(
@@ -210,3 +214,20 @@ def test_the_deck_does_not_depend_on_the_number_of_ranks(comm, shared_path):
         assert '*SURFACE, TYPE=ELEMENT, NAME="bond"' in text
         first = text.split("*ELEMENT")[1].split("\n")[1].split(",")
         assert len(first) == 9 and first[0] == "1"
+
+
+@pytest.mark.parametrize("pairing", ["node-to-surface", "surface-to-surface"])
+def test_couplings_equations_and_pairing(tmp_path, pairing):
+    """Load blocks with hinges, a symmetric motion of the far end, TYPE of the contact pair."""
+    supports = [
+        fx.Coupling("end_upper", (0.0, 0.75), x=0.0, name="block"),
+        fx.Coupling("end_upper", (0.0, 0.75), y=1.0, name="block",
+                    amplitude=fx.Amplitude((0.0, 2.0), (0.0, 2.0))),
+        fx.Displacement("pin_bottom", x=0.0),
+        fx.Equation((("pin_bottom", "y", 1.0), ("pin_top", "y", 1.0))),
+    ]  # fmt: skip
+    mesh = dcb_2d(dx=2.0, ny=1)
+    one = scene(mesh, supports=supports, interface={"pairing": pairing})
+    deck = round_trip(tmp_path / "out.inp", one, [INCREMENTS], rel=1e-9)
+    assert any(isinstance(s, fx.Coupling) for s in deck.scene.input.supports)
+    assert deck.scene.debonds[0].interface.pairing == pairing

@@ -15,6 +15,7 @@ from fxcrack.demos import (
     center_crack,
     dcb,
     dcb3d,
+    domain_integral,
     effects_cost,
     enf,
     enhanced_dcb,
@@ -206,6 +207,15 @@ def test_large_rotation_follows_the_elastica() -> None:
         assert large_dcb.corrections(a, opening)[0] > 1.1  # far from small rotations
     largest = np.abs(scene.history["external_work"]).max()
     assert np.abs(scene.history["balance"]).max() <= 1e-4 * largest
+
+
+@pytest.mark.slow
+def test_the_domain_integral_does_not_see_jumps_of_the_spacing() -> None:
+    # two elements over an arm, ratios of 1:4 to 4:1
+    rows = np.array(domain_integral.run(ny=2))
+    vcct, domain = rows[:, 2], rows[:, 4]
+    assert domain == pytest.approx(np.ones(len(rows)), rel=0.01)
+    assert np.ptp(domain) < 0.2 * np.ptp(vcct)
 
 
 @pytest.mark.quick("None")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from specimens import bond, dcb, specimen
+from specimens import FORCES, HELD_FAR, bond, dcb, specimen
 
 import fxcrack as fx
 from fxcrack.demos import penny, thermal_bilayer
@@ -77,10 +77,10 @@ def domain(**options: Any) -> fx.VCCT:
 
 @pytest.mark.parametrize(("loads", "mode", "width"), [(INFLATED, "I", WIDE), (SHEARED, "II", 1.0)])
 def test_centre_crack(loads: Sequence[Any], mode: str, width: float) -> None:
-    # measured: G -1.5 % pulled (VCCT -1.9), -2.6 % sheared (VCCT -3.0); K 0.06 % and 0.2 %
+    # measured: G within 0.1 % (VCCT -1.9 % pulled, -3.0 % sheared)
     row = plate(loads, domain())
     exact = np.pi * (1.0 - NU**2) / E * width
-    assert float(row[f"G{mode}[bond]"]) == pytest.approx(exact, rel=0.03)
+    assert float(row[f"G{mode}[bond]"]) == pytest.approx(exact, rel=0.005)
     k = np.sqrt(np.pi * width)
     assert abs(float(row[f"K{mode}[bond]"])) == pytest.approx(k, rel=0.005)
     other = "II" if mode == "I" else "I"
@@ -96,9 +96,9 @@ def test_pressure_on_the_faces_is_remote_tension() -> None:
 
 @pytest.mark.parametrize("cell", ["quadrilateral", "triangle"])
 def test_first_order_intensity_factor(cell: str) -> None:
-    # 8 elements along half the crack, where VCCT is 3 and 5 % short: measured 0.9 % and 0.1 % of G
+    # 8 elements along half the crack, where VCCT is 3 and 6 % short of G: measured 0.1 %
     row = plate(PULLED, domain(), order=1, n=8, cell=cell)
-    assert float(row["KI[bond]"]) == pytest.approx(np.sqrt(np.pi * WIDE), rel=0.01)
+    assert float(row["KI[bond]"]) == pytest.approx(np.sqrt(np.pi * WIDE), rel=0.005)
 
 
 def oscillation(a: fx.Isotropic, b: fx.Isotropic) -> float:
@@ -116,7 +116,7 @@ def test_crack_between_two_materials(length: float) -> None:
     eps = oscillation(STIFF, SOFT)
     exact = (1.0 + 2j * eps) * (0.5 * length) ** (1j * eps) * np.sqrt(np.pi * WIDE)
     k = complex(float(row["KI[bond]"]), float(row["KII[bond]"]))
-    assert abs(np.angle(k, deg=True)) == pytest.approx(abs(np.angle(exact, deg=True)), abs=0.3)
+    assert np.angle(k, deg=True) == pytest.approx(np.angle(exact, deg=True), abs=0.3)
     assert abs(k) == pytest.approx(abs(exact), rel=0.005)
 
 
@@ -148,31 +148,34 @@ def test_rings_do_not_matter() -> None:
 
 @pytest.mark.slow
 def test_ring_reaches_beyond_a_thin_arm() -> None:
-    """Beams of second order: the load of closed forms, with rings that pass the free faces."""
+    """Beams of second order: the load of closed forms, with rings that pass the free faces.
+
+    Forces are given, so that no compliance comes in between load and G.
+    """
     loads = []
     for rings in (1, 3, 6):
         scene = dcb(
-            MPI.COMM_WORLD, dx=1.0, ny=2, order=2,
-            criterion=fx.VCCT(GIc=0.2, method="domain", rings=rings),
+            MPI.COMM_WORLD, dx=1.0, ny=2, order=2, loads=FORCES,
+            supports=HELD_FAR, criterion=fx.VCCT(GIc=0.2, method="domain", rings=rings),
         )  # fmt: skip
         scene.run(fx.Static(until=fx.Releases(1)), progress=False)
-        loads.append(next(r for r in scene.history if r["event"] == "onset")["R[pin_top.y]"])
+        loads.append(next(r for r in scene.history if r["event"] == "onset")["time"])
         scene.close()
-    # corrected beam theory 2.122; measured 2.126
+    # corrected beam theory 2.122; measured 2.12
     assert np.allclose(loads[1:], 2.122, rtol=5e-3)
     assert loads[0] == pytest.approx(2.122, rel=0.03)
 
 
 @pytest.mark.parametrize("order", [1, 2])
 def test_penny_shaped_crack(order: int) -> None:
-    # measured, 8 elements along the radius: K 0.7 and 0.1 % short; G 6.4 and 0.9 %
+    # measured, 8 elements along the radius: G +0.9 and -0.3 %
     scene, found = penny.run(0.25, order, "domain")
     row = next(r for r in scene.history if r["event"] == "onset")
     k = float(row["KI[crack]"]) / float(row["time"])
     scene.close()
     exact = 2.0 * penny.PRESSURE * np.sqrt(penny.RADIUS / np.pi)
-    assert k == pytest.approx(exact, rel=0.015 if order == 1 else 0.003)
-    assert found["G / exact"] == pytest.approx(1.0, rel=0.1 if order == 1 else 0.02)
+    assert k == pytest.approx(exact, rel=0.01 if order == 1 else 0.003)
+    assert found["G / exact"] == pytest.approx(1.0, rel=0.02 if order == 1 else 0.006)
 
 
 @pytest.mark.parametrize("solver", [None, "newton"])
@@ -200,6 +203,95 @@ def test_bilayer_that_cools(solver: str | None) -> None:
     scene.close()
 
 
+def test_modes_beside_loads_on_outer_faces() -> None:
+    """A ring that reaches the loaded face of a thin arm gives the factors of one that does not.
+
+    The integrals do not depend on the ring: measured 2e-4 of the larger factor.
+    """
+    found = []
+    for rings in (2, 6):
+        scene = specimen(
+            dcb_2d(length=20.0, dx=0.25, ny=6, order=2),
+            a0=10.0,
+            criterion=domain(rings=rings),
+            supports=HELD_FAR,
+            loads=[fx.Traction("top", (0.3, 1.0))],
+        )
+        row = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)[-1]
+        found.append([float(row[f"{k}[bond]"]) for k in ("KI", "KII")])
+        scene.close()
+    assert np.allclose(found[1], found[0], rtol=1e-3)
+
+
+@pytest.mark.parametrize("lengths", [(1.0, 0.5), (0.25, 1.0)])
+def test_tip_on_a_jump_of_the_element_size(lengths: tuple[float, float]) -> None:
+    """A load on the ends of a DCB, corrected beam theory: measured within 0.1 % at 1:4 to 4:1.
+
+    VCCT is up to 1.1 % off there.
+    """
+    behind, ahead = lengths
+    x = np.concatenate([np.arange(0.0, 30.0, behind), np.arange(30.0, 60.1, ahead)])
+    scene = specimen(
+        dcb_2d(length=60.0, x_spacing=x, ny=3, order=2),
+        loads=FORCES,
+        supports=HELD_FAR,
+        criterion=fx.VCCT(GIc=0.2, method="domain"),
+    )
+    scene.run(fx.Static(until=fx.Releases(1)), progress=False)
+    onset = next(r for r in scene.history if r["event"] == "onset")
+    scene.close()
+    assert float(onset["time"]) == pytest.approx(2.122, rel=5e-3)
+
+
+THIN: dict[str, Any] = {"length": 20.0, "height": 0.5, "dx": 0.5, "ny": 1, "order": 2}
+
+
+def test_finite_strain_at_small_loads_is_small_strain() -> None:
+    """Unequal forces, so that both modes act: differences of the order of the strain, 1e-4."""
+    found = []
+    loads = [fx.PointForce("pin_top", (0.0, 1e-3)), fx.PointForce("pin_bottom", (0.0, -5e-4))]
+    for effects in ([], [fx.FiniteStrain()]):
+        scene = specimen(
+            dcb_2d(**THIN), a0=10.0, criterion=domain(), effects=effects, loads=loads,
+            supports=HELD_FAR,
+        )  # fmt: skip
+        row = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)[-1]
+        found.append([float(row[f"{k}[bond]"]) for k in ("GI", "GII", "KI", "KII")])
+        scene.close()
+    assert np.allclose(found[1], found[0], rtol=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("material", [STIFF, fx.NeoHookean(E, NU)])
+def test_finite_strain_releases_the_energy(material: Any) -> None:
+    """Arms that turn by 25 degrees: G is the derivative of the energy at held displacements.
+
+    The energies are those of cracks 0.06 elements shorter: their G is 1.2 % larger at a = 10, where
+    it goes with the fourth power; measured 0.8 %.
+    """
+    energies, total = [], 0.0
+    for a in (9.5, 10.0, 10.5):
+        scene = specimen(
+            dcb_2d(**THIN),
+            a0=a,
+            materials=material,
+            criterion=fx.VCCT(GIc=1e9, method="domain"),
+            effects=[fx.FiniteStrain()],
+            supports=[
+                fx.Displacement("pin_top", y=3.0),
+                fx.Displacement("pin_bottom", y=-3.0),
+                *HELD_FAR,
+            ],
+        )
+        step = fx.Static(until=fx.Time(1.0), initial=0.25, maximum=0.25)
+        row = scene.run(step, progress=False)[-1]
+        energies.append(float(row["strain_energy"]))
+        if a == 10.0:
+            total = sum(float(row[f"G{mode}[bond]"]) for mode in ("I", "II"))
+        scene.close()
+    assert total == pytest.approx(energies[0] - energies[2], rel=0.015)
+
+
 def test_onsets_of_a_growing_crack() -> None:
     """Every onset lies at f = 1 exactly, and energy balances: loads come from the same states."""
     scene = dcb(MPI.COMM_WORLD, dx=1.0, ny=2, criterion=fx.VCCT(GIc=0.2, method="domain"))
@@ -213,7 +305,8 @@ def test_watched_beside_another_method() -> None:
     row = plate(PULLED, fx.VCCT(GIc=1.0), watch=[domain(), fx.VCCT(GIc=1.0, method="closure")])
     decides, watched = float(row["GI[bond]"]), float(row["GI_domain[bond]"])
     assert watched != decides
-    assert watched == pytest.approx(decides, rel=0.02)
+    # VCCT is 1.9 % below the closed form on this mesh, the integral at it
+    assert watched == pytest.approx(decides * 1.02, rel=0.005)
     assert float(row["GI_closure[bond]"]) == pytest.approx(decides * 1.12, rel=0.05)
 
 
@@ -233,7 +326,7 @@ def test_front_in_space_releases_the_energy() -> None:
             crack = scene.cracks[0]
             values = crack.evaluate(crack.tips(), scene.solver.state, scene.time)
             rates = sum(values.report[f"G{mode}"] for mode in ("I", "II", "III"))
-            # corner nodes have hats along the front, midside nodes the mean of both beside them
+            # corner nodes have linear functions along the front, midside nodes the mean of both
             z = scene.pairs[0].surface.x[values.tips.node, 2]
             share = {0.0: 1.25, 2.5: 2.5, 5.0: 1.25}
             width = np.array([share.get(float(np.round(v, 6)), 0.0) for v in z])
@@ -254,8 +347,6 @@ def test_refusals() -> None:
     law = fx.VCCT(GIc=0.2, method="domain")
     assert "StepRelease" in refused(lambda: fx.Debond(interface, law, fx.ProgressiveRelease()))
     step = fx.Static(until=fx.Releases(1))
-    finite = specimen(mesh, criterion=law, effects=[fx.FiniteStrain()])
-    assert "finite strain" in refused(lambda: finite.run(step))
     plastic = specimen(mesh, criterion=law, materials=fx.Plastic(70e3, 0.3, yield_stress=1e3))
     assert "plasticity" in refused(lambda: plastic.run(step))
 

@@ -116,6 +116,10 @@ def test_the_former_name_of_the_retained_jumps_still_works() -> None:
     details = Details(retained=7)
     with pytest.warns(DeprecationWarning, match=r"now called details\['retained'\]"):
         assert details["window"] == 7
+    with pytest.warns(DeprecationWarning, match=r"now called details\['retained'\]"):
+        assert details.get("window") == 7
+    assert details.get("retained") == 7
+    assert details.get("dofs", 3) == 3
     with pytest.raises(KeyError, match="dofs"):
         details["dofs"]
 

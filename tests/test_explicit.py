@@ -39,10 +39,9 @@ def beam(
     given: dict[str, Any] = {} if "release" not in options else {"release": options.pop("release")}
     return fx.Scene(
         mesh or dcb_2d(comm, length=80.0, height=1.5, dx=0.5, ny=3),
-        materials=ALUMINIUM,
         model=fx.PlaneStrain(thickness=20.0),
         debonds=[fx.Debond(interface, criterion or fx.VCCT(GIc=G_IC), **given)],
-        **{"effects": [fx.Inertia()], "supports": pins(speed), **options},
+        **{"materials": ALUMINIUM, "effects": [fx.Inertia()], "supports": pins(speed), **options},
     )
 
 
@@ -83,14 +82,19 @@ def test_impact_on_a_dcb_as_the_prototype_has_it(comm: MPI.Intracomm) -> None:
 
 
 @pytest.mark.mpi
-def test_histories_do_not_depend_on_ranks(comm: MPI.Intracomm) -> None:
-    scene = beam(comm, 8e3, mesh=coarse(comm))
-    history = scene.run(until(scene, 36.0, 3e-4, rows=50))
+@pytest.mark.parametrize(
+    ("speed", "end"),
+    [(8e3, 3e-4), pytest.param(1e3, 1.25e-3, marks=pytest.mark.slow)],
+    ids=["impact", "10,000 increments"],
+)
+def test_histories_do_not_depend_on_ranks(comm: MPI.Intracomm, speed: float, end: float) -> None:
+    scene = beam(comm, speed, mesh=coarse(comm))
+    history = scene.run(until(scene, 36.0, end, rows=50))
     scene.close()
     alone = None
     if comm.rank == 0:
-        scene = beam(MPI.COMM_SELF, 8e3, mesh=coarse(MPI.COMM_SELF))
-        alone = scene.run(until(scene, 36.0, 3e-4, rows=50)).rows
+        scene = beam(MPI.COMM_SELF, speed, mesh=coarse(MPI.COMM_SELF))
+        alone = scene.run(until(scene, 36.0, end, rows=50)).rows
         scene.close()
     alone = comm.bcast(alone)
     assert [r["event"] for r in alone] == [r["event"] for r in history.rows]
@@ -114,7 +118,8 @@ def test_non_matching_faces_spend_the_toughness(comm: MPI.Intracomm) -> None:
     assert imbalance(history) <= 1e-10
     # bonds that share masters are solved in sweeps, of which stiff ones need more than there are
     assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=2e-6)
-    assert np.all(history["tie_energy"][1:] >= 0.0)
+    # kinetic energies are subtracted, so what is none is round-off of either sign
+    assert np.all(history["tie_energy"] >= -1e-12 * history["external_work"][-1])
     assert history["tie_energy"][-1] <= 1e-3 * history["external_work"][-1]
 
 
@@ -150,7 +155,9 @@ SHEAR_SPEED = np.sqrt(0.5 * E / (1.0 + NU) / RHO)
 RAYLEIGH_SPEED = (0.862 + 1.14 * NU) / (1.0 + NU) * SHEAR_SPEED
 
 
-def strip(comm: MPI.Intracomm, over: float, per_half: int, **options: Any) -> fx.Scene:
+def strip(
+    comm: MPI.Intracomm, over: float, per_half: int, *, length: float = 14.0 * HALF, **options: Any
+) -> fx.Scene:
     """A strip whose G is ``over`` times the toughness, cracked up to four half heights."""
     u0 = np.sqrt(over * G_IC * HALF / MODULUS)
     interface = fx.Interface(
@@ -159,7 +166,7 @@ def strip(comm: MPI.Intracomm, over: float, per_half: int, **options: Any) -> fx
     )  # fmt: skip
     held = fx.Amplitude((0.0,), (1.0,))
     return fx.Scene(
-        dcb_2d(comm, length=14.0 * HALF, height=HALF, dx=HALF / per_half, ny=per_half),
+        dcb_2d(comm, length=length, height=HALF, dx=HALF / per_half, ny=per_half),
         materials=ALUMINIUM,
         model=fx.PlaneStrain(),
         supports=[
@@ -203,6 +210,37 @@ def test_a_strip_cracks_below_the_rayleigh_speed(
     assert speed == pytest.approx(known, abs=0.08)
     assert speed < 1.0
     assert np.abs(history["balance"]).max() <= 1e-12 * history["initial_energy"][0]
+
+
+@pytest.mark.slow
+def test_energies_balance_through_five_hundred_releases() -> None:
+    scene = strip(MPI.COMM_SELF, 1.5, 4, length=4.0 * HALF + 510.0 * HALF / 4)
+    history = scene.run(
+        fx.Explicit(until=[fx.Releases(500), fx.Time(1e-3)], start="equilibrium", rows=500)
+    )
+    scene.close()
+    assert history["released[bond]"][-1] == 500
+    assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=1e-12)
+    assert np.abs(history["balance"]).max() <= 1e-12 * history["initial_energy"][0]
+
+
+@pytest.mark.slow
+def test_slow_loading_is_quasi_static() -> None:
+    """0.2 m/s on coarse elements: openings at release within 2 % of those of a static step."""
+    still = beam(
+        MPI.COMM_SELF, 1.0, mesh=coarse(MPI.COMM_SELF), effects=[],
+        release=fx.ProgressiveRelease(),
+    )  # fmt: skip
+    static = still.run(fx.Static(until=fx.CrackLength(interface_of(still), 34.0)))
+    still.close()
+    scene = beam(MPI.COMM_SELF, 200.0, mesh=coarse(MPI.COMM_SELF))
+    history = scene.run(until(scene, 34.0, 8e-3, rows=2000))
+    scene.close()
+    lengths = (31.0, 32.0, 33.0, 34.0)
+    known = opening_at(static, 1.0, lengths)
+    assert opening_at(history, 200.0, lengths) == pytest.approx(known, rel=0.02)
+    late = history["time"].astype(float) > 0.5 * history["time"][-1]
+    assert (history["kinetic_energy"] / history["external_work"])[late].max() < 0.01
 
 
 # -- impact ---------------------------------------------------------------------------------------

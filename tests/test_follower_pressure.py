@@ -21,11 +21,12 @@ import pytest
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.continuum.amplitudes import constant
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.load_vectors import load_vector
-from fxcrack.continuum.loads import Field, constant
+from fxcrack.continuum.loads import Field
 from fxcrack.continuum.neo_hookean import NeoHookeanBodies
 from fxcrack.continuum.weak_form import WeakForm
 

@@ -9,6 +9,7 @@ import scipy.linalg
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fxcrack.equilibrium import growing_cholesky
 from fxcrack.equilibrium.growing_cholesky import GrowingCholesky, NotPositiveDefinite
 
 Array = npt.NDArray[np.float64]
@@ -97,6 +98,30 @@ def test_unrestrained_unknown_changes_nothing(n_free: int, n_extra: int, pick: i
     # the others are restrained as long as one of them is held
     factor.append(order[n_free:-1])
     assert_right(factor, matrix, np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_large_sets_are_factored_anew_in_pieces(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
+    """Beyond AT_ONCE unknowns removal takes the rest from S again, some at a time."""
+    monkeypatch.setattr(growing_cholesky, "AT_ONCE", 13)
+    matrix, rng = spd(N, seed), np.random.default_rng(seed)
+    factor = GrowingCholesky(matrix)
+    factor.append(rng.permutation(N)[:120])
+    anew = []
+    whole = GrowingCholesky._factor_anew
+    monkeypatch.setattr(
+        GrowingCholesky, "_factor_anew", lambda *given: (anew.append(1), whole(*given))
+    )
+    for count in (1, 30, 5):
+        before = factor.free.copy()
+        gone = before[rng.permutation(len(before) // 3)[:count]]
+        first = factor.remove(gone)
+        assert np.array_equal(factor.free, before[~np.isin(before, gone)])
+        assert np.array_equal(factor.free[:first], before[:first])
+        assert_right(factor, matrix, rng)
+        factor.append(gone)
+        assert_right(factor, matrix, rng)
+    assert anew
 
 
 @pytest.mark.parametrize("stiffness", [0.0, 1e-6])

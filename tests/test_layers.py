@@ -26,7 +26,7 @@ ORDER = (
     *("base", "mesh", "meshes", "continuum", "interface", "condensation", "equilibrium"),
     *("solvers", "criteria", "history", "steps", "restart", "output"),
     *("effects", "error_estimate", "beam_theory", "scene_input", "step_run", "scene", "deck"),
-    *("public names", "demos", "accuracy", "bench", "cli", "command"),
+    *("public names", "identify", "demos", "accuracy", "bench", "cli", "command"),
 )
 """From the bottom up; "public names" is ``fxcrack/__init__.py``."""
 

@@ -292,4 +292,4 @@ def test_rate_criteria_say_what_they_need() -> None:
     assert fx.VCCT(1.0, 2.0, mix=fx.Power(am=2.0, an=2.0)).degree == 4.0
     assert fx.VCCT(1.0, 2.0, mix=fx.Power(am=1.0, an=2.0)).degree is None
     assert fx.VCCT(1.0, 2.0, mix=ellipse).degree is None
-    assert fx.Fatigue(GIc=1.0, paris=fx.Paris(0.0, -1.0, 1.0, 3.0)).life_exponent == 3.0
+    assert fx.Fatigue(GIc=1.0, paris=fx.Paris(0.0, -1.0, 1.0, 3.0)).life_exponent(1.0) == 3.0

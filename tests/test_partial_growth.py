@@ -190,6 +190,79 @@ def test_going_on_from_a_checkpoint_within_an_element(tmp_path: Path) -> None:
         assert again.rows[-1][name] == pytest.approx(whole.rows[-1][name], rel=1e-9)
 
 
+def test_restart_within_a_step_goes_on_with_the_same_blocks(tmp_path: Path) -> None:
+    """Where rates change much within an element blocks are short, and stay so after a restart."""
+    step = fx.Cycles(maximum=0.1, ratio=0.1, until=fx.Releases(2))
+    checkpoint = fx.Checkpoint(tmp_path / "state.npz", every=1)
+
+    class Stopped(Exception):
+        pass
+
+    def stop(event: str, _: Any) -> None:
+        if event == "release":
+            raise Stopped
+
+    def make() -> fx.Scene:
+        paris = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=10.6, r1=0.01, r2=0.95)
+        law = fatigue_law(GIc=0.6, paris=paris, partial=True)
+        return specimen(dcb_2d(length=24.0, dx=2.0, ny=1), a0=8.0, criterion=law)
+
+    scene = make()
+    whole = scene.run(step, progress=False).rows
+    scene.close()
+    scene = make()
+    with pytest.raises(Stopped):
+        scene.run(step, checkpoint=checkpoint, observers=[stop], progress=False)
+    scene.close()
+    scene = make()
+    again = scene.run(step, checkpoint=checkpoint, restart=True, progress=False).rows
+    tips = scene.history.details["tips"]
+    scene.close()
+    # the premise: more blocks than four an element
+    assert len(tips["N"]) > 2 * 4 + 1
+    for name in ("N", "a[bond]", "dG[bond]"):
+        assert again[-1][name] == pytest.approx(whole[-1][name], rel=1e-9)
+
+
+def test_tips_whose_loads_are_out_of_phase_grow_by_their_own_rates() -> None:
+    """Arms opened at both ends of a bond: together or in turn, each tip sees the same cycle.
+
+    They are 13 thicknesses apart; what one end does at the other falls by exp(-13) and more.
+    """
+    law = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.1, r2=0.95)
+    times = (0.0, 1.0, 2.0, 3.0, 4.0)
+    one = fx.Amplitude(times, (0.0, 1.0, 0.0, 0.0, 0.0))
+    later = fx.Amplitude(times, (0.0, 0.0, 0.0, 1.0, 0.0))
+
+    def lives(two: fx.Amplitude) -> dict[int, float]:
+        interface = fx.Interface(
+            "upper_face", "lower_face", lambda x: np.abs(x[0] - 30.0) <= 10.0 + 1e-9, name="bond"
+        )
+        scene = specimen(
+            dcb_2d(length=60.0, dx=1.0, ny=2),
+            interface=interface,
+            criterion=fatigue_law(paris=law, partial=True),
+            supports=[
+                fx.Displacement("pin_top", x=0.0),
+                fx.Displacement("pin_bottom", x=0.0),
+                fx.Displacement("pin_top", y=0.5, amplitude=one),
+                fx.Displacement("pin_bottom", y=-0.5, amplitude=one),
+                fx.Displacement("far_upper", y=0.46, amplitude=two),
+                fx.Displacement("far_lower", y=-0.46, amplitude=two),
+            ],
+        )
+        step = fx.Cycles(period=(0.0, 4.0), until=fx.Releases(3))
+        tips = scene.run(step, progress=False).details["tips"]
+        scene.close()
+        gone = np.flatnonzero(tips["released"])
+        return {int(tips["node"][i]): float(tips["N"][i]) for i in gone}
+
+    together, in_turn = lives(one), lives(later)
+    assert sorted(together) == sorted(in_turn) and len(together) == 3
+    for node, N in together.items():
+        assert in_turn[node] == pytest.approx(N, rel=1e-5)
+
+
 def test_arrest_within_an_element() -> None:
     law = fx.Paris(c1=0.0, c2=-2.0, c3=0.5, c4=4.0, r1=0.56, r2=0.9)  # stops at G = 0.224
     scene = fatigue_specimen(criterion=fatigue_law(paris=law, partial=True))

@@ -151,6 +151,14 @@ def run(one: fx.Scene) -> fx.Scene:
     return one
 
 
+def folded(comm: MPI.Intracomm) -> fx.Mesh:
+    """A plate folded after it was distributed, so that the smooth parts share their nodes."""
+    mesh = plate(comm)
+    x = mesh.domain.geometry.x
+    x[:, 2] = 3.0 * np.abs(x[:, 0] - 2.0)
+    return mesh
+
+
 FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
     "solid on a surface": (lambda c: scene(plate(c), model=fx.Solid()), "dimension 3"),
     "shell on a volume": (
@@ -187,10 +195,7 @@ FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
         ),
         "oblique",
     ),
-    "kink": (
-        lambda c: scene(plate(c, surface=lambda a, b: (a, b, 3.0 * np.abs(a - 2.0)))),
-        "kink",
-    ),
+    "kink with common nodes": (lambda c: scene(folded(c)), "kink"),
     "iterative": (
         lambda c: scene(plate(c), options=fx.CondensedOptions(method="iterative")),
         "not possible with shells",
@@ -200,10 +205,29 @@ FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
         "both faces",
     ),
     "temperature": (
-        lambda c: scene(plate(c), effects=[fx.Temperature(100.0)]),
-        "not possible in shells",
+        lambda c: run(
+            scene(plate(c), effects=[fx.Temperature(lambda x: np.where(x[0] > 1, np.nan, 0.0))])
+        ),
+        "not a finite number",
     ),
-    "inertia": (lambda c: scene(plate(c), effects=[fx.Inertia()]), "not possible in shells"),
+    "inertia without density": (
+        lambda c: scene(
+            plate(c),
+            materials=fx.Section(fx.Isotropic(70e3, 0.3), thickness=1.0),
+            effects=[fx.Inertia()],
+        ),
+        "no density",
+    ),
+    "damping by stiffness": (
+        lambda c: scene(plate(c), effects=[fx.Inertia(density=1.0, rayleigh=(0.0, 1.0))]),
+        "damping by stiffness is not available",
+    ),
+    "explicit dynamics": (
+        lambda c: scene(plate(c), effects=[fx.Inertia(density=1.0)]).run(
+            fx.Explicit(until=fx.Time(1.0)), progress=False
+        ),
+        "no lumped masses",
+    ),
     "pressure that follows": (
         lambda c: scene(plate(c), loads=[fx.Pressure(fx.Face("plate", "top"), 1.0, follows=True)]),
         "keeps its direction",

@@ -15,6 +15,8 @@ import pytest
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.base import compat
+from fxcrack.mesh import Group
 from fxcrack.meshes.sheets import Sheet, sheets
 
 UD = fx.Orthotropic(
@@ -70,13 +72,20 @@ def mean_rates(scene: fx.Scene) -> np.ndarray[Any, np.dtype[np.float64]]:
 LENGTH, WIDTH, HEIGHT, A0 = 100.0, 25.0, 1.5, 30.0
 
 
-def dcb(comm: MPI.Intracomm, element: tuple[str, int], dx: float, ny: int = 1, **more: Any) -> Any:
+def dcb(
+    comm: MPI.Intracomm,
+    element: tuple[str, int],
+    dx: float,
+    ny: int = 1,
+    height: float = HEIGHT,
+    **more: Any,
+) -> Any:
     mesh = two_arms(
-        comm, length=LENGTH, width=WIDTH, heights=(HEIGHT, HEIGHT), dx=dx, ny=ny, element=element
+        comm, length=LENGTH, width=WIDTH, heights=(height, height), dx=dx, ny=ny, element=element
     )
     given: dict[str, Any] = {
         "model": fx.Shell(),
-        "materials": fx.Section(UD, thickness=HEIGHT),
+        "materials": fx.Section(UD, thickness=height),
         "supports": [
             fx.Clamp("upper_a1"),
             fx.Clamp("lower_a1"),
@@ -88,13 +97,13 @@ def dcb(comm: MPI.Intracomm, element: tuple[str, int], dx: float, ny: int = 1, *
     return fx.Scene(mesh, **{**given, **more})
 
 
-def over_beam_theory(scene: fx.Scene) -> tuple[float, float]:
+def over_beam_theory(scene: fx.Scene, height: float = HEIGHT) -> tuple[float, float]:
     """Load over corrected beam theory's at its opening, G over its G at the model's own load."""
     scene.run(fx.Static(until=fx.Time(0.01)), progress=False)  # before the onset
     load = float(scene.history["R[upper_a0.z]"][-1]) / 0.01
     ratio = 1.18 * np.sqrt(E1 * E3) / G13
     chi = np.sqrt(E1 / (11.0 * G13) * (3.0 - 2.0 * (ratio / (1.0 + ratio)) ** 2))
-    inertia, a = WIDTH * HEIGHT**3 / 12.0, A0 + chi * HEIGHT
+    inertia, a = WIDTH * height**3 / 12.0, A0 + chi * height
     rate = float(mean_rates(scene).sum()) / 0.01**2
     return load * 2.0 * a**3 / (3.0 * E1 * inertia), rate * WIDTH * E1 * inertia / (load * a) ** 2
 
@@ -115,6 +124,38 @@ def test_dcb(
     """Translations tied, rotations free: the root turns as corrected beam theory says."""
     found = over_beam_theory(dcb(comm, element, dx))
     assert found == pytest.approx(wanted, abs=5e-3)
+
+
+@pytest.mark.parametrize(
+    ("element", "wanted"), [(("quadrilateral", 1), 1.014), (("quadrilateral", 2), 1.003)]
+)
+def test_arms_a_hundredth_of_the_crack_thick(
+    comm: MPI.Intracomm, element: tuple[str, int], wanted: float
+) -> None:
+    """Cells 17 times as long as an arm of 0.3 is high."""
+    load, _ = over_beam_theory(dcb(comm, element, 5.0, height=0.3), 0.3)
+    assert load == pytest.approx(wanted, abs=3e-3)
+
+
+def test_a_face_of_several_sections(comm: MPI.Intracomm) -> None:
+    """An arm that is thicker on its outside far behind the front: the bonded face is flush."""
+
+    def parts(mesh: fx.Mesh) -> None:
+        x = mesh.domain.geometry.x[compat.geometry_dofmap(mesh.domain)].mean(axis=1)
+        for name, here in (("near", x[:, 0] < 60.0), ("far", x[:, 0] > 60.0)):
+            cells = np.flatnonzero(here & (x[:, 2] > 0.0)).astype(np.int32)
+            mesh.groups[name] = Group(2, cells)
+
+    plain = dcb(comm, ("quadrilateral", 1), 2.5)
+    load, rate = over_beam_theory(plain)
+    parts(plain.mesh)
+    near, low = fx.Section(UD, thickness=HEIGHT), fx.Section(UD, thickness=HEIGHT)
+    far = fx.Section(UD, thickness=2.0, offset=0.5 * (2.0 - HEIGHT))
+    stepped = plain.rebuilt(materials={"near": near, "far": far, "lower": low})
+    # 20 thicknesses behind the front
+    assert over_beam_theory(stepped) == pytest.approx((load, rate), rel=1e-3)
+    with pytest.raises(fx.InputError, match="offsets that put this side at one height"):
+        plain.rebuilt(materials={"near": near, "far": fx.Section(UD, thickness=2.0), "lower": low})
 
 
 def test_triangles_as_quadrilaterals(comm: MPI.Intracomm) -> None:

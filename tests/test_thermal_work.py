@@ -24,10 +24,10 @@ from mpi4py import MPI
 import fxcrack as fx
 from fxcrack.base.errors import InputError
 from fxcrack.continuum import thermal_strain as thermal
+from fxcrack.continuum.amplitudes import constant
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.load_vectors import load_vector
-from fxcrack.continuum.loads import constant
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.neo_hookean import NeoHookeanBodies
 from fxcrack.continuum.stress import cell_stress

@@ -20,7 +20,12 @@ from fxcrack.output.plots.style import COLOURS, GREY, INK, LIGHT, new_figure, sa
 
 Result = dict[str, Any]
 
-_SHAPES = (("quadrilateral", "hexahedron"), ("triangle", "tetrahedron"))
+_COLOUR = {
+    **{"quadrilateral": 0, "hexahedron": 0, "triangle": 2, "tetrahedron": 2},
+    **{"continuum shell": 2, "shell": 4},
+}
+"""Colour of the first order of each shape, the next one that of the second."""
+_PALETTE = (*COLOURS, "#8c6d1f")
 _MARKERS = {"vcct": "o", "closure": "s", "increment": "^", "solver": "D", "ranks": "h"}
 _WORDS = {
     "vcct": "VCCT, events",
@@ -124,8 +129,7 @@ def _kind(setting: Setting, base: Setting) -> str:
 
 
 def _colour(setting: Setting) -> str:
-    simplex = setting.cell in _SHAPES[1]
-    return COLOURS[(setting.order - 1) + 2 * int(simplex)]
+    return _PALETTE[setting.order - 1 + _COLOUR[setting.cell]]
 
 
 def _logarithmic(ax: Axes, xlabel: str, ylabel: str) -> None:
@@ -195,7 +199,7 @@ def _explain(ax: Axes, settings: list[Setting], front: list[int], unit: str) -> 
     """Beside the axes: what colours and shapes of points mean, and which settings are the front."""
     handles = [Line2D([], [], color=INK, linewidth=1.4, label="nothing faster is better")]
     seen = {_colour(s): s for s in reversed(settings)}
-    for colour in COLOURS:
+    for colour in _PALETTE:
         if colour in seen:
             name = f"{seen[colour].title.partition(',')[0]}s".replace("hexs", "hexes")
             handles.append(

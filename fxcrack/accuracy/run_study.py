@@ -181,7 +181,8 @@ def assemble(study: Study, records: list[tuple[Setting, Result]], measure: str) 
             "or worst"
         )
     theory = records[0][1]["theory"]
-    known = reference(values, theory, study.steppings[0])
+    trusted = [(s, v) for s, v in values if not study.refers_to or s.cell in study.refers_to]
+    known = reference(trusted, theory, study.steppings[0])
     if known is None:
         raise InputError(
             "there is neither an exact closed form nor a line of two sizes to count errors from; "

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fxcrack.accuracy.bending import STRIPS
 from fxcrack.accuracy.study import (
     Case,
     ClosedForm,
@@ -338,7 +339,10 @@ def fatigue_dcb(setting: Setting) -> Case:
     )
 
 
-STUDIES: dict[str, Study] = {s.make.__name__: s for s in (dcb, enf, mmb, penny, fatigue_dcb)}
+STUDIES: dict[str, Study] = {
+    **{s.make.__name__: s for s in (dcb, enf, mmb, penny, fatigue_dcb)},
+    **STRIPS,
+}
 
 
 def known(name: str) -> Study:

@@ -21,8 +21,14 @@ from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.end_conditions import Until
 from fxcrack.steps.static import Static
 
-_CELLS = {"quadrilateral": 2, "triangle": 2, "hexahedron": 3, "tetrahedron": 3}
-_SHORT = {"quadrilateral": "quad", "triangle": "tri", "hexahedron": "hex", "tetrahedron": "tet"}
+_CELLS = {
+    **{"quadrilateral": 2, "triangle": 2, "hexahedron": 3, "tetrahedron": 3},
+    **{"continuum shell": 3, "shell": 2},
+}
+_SHORT = {
+    **{"quadrilateral": "quad", "triangle": "tri", "hexahedron": "hex", "tetrahedron": "tet"},
+    **{"continuum shell": "continuum shell", "shell": "shell"},
+}
 _ORDERS = {1: "1st", 2: "2nd"}
 
 
@@ -33,7 +39,8 @@ class Setting:
     Args:
         size: Element size along the crack (length).
         order: Order of mesh and displacement, 1 or 2.
-        cell: "quadrilateral", "triangle", "hexahedron" or "tetrahedron".
+        cell: "quadrilateral", "triangle", "hexahedron" or "tetrahedron"; "continuum shell" for
+            hexahedra, or "shell" for quadrilaterals in space, as these elements.
         method: How G is found: "vcct" or "closure".
         stepping: "event", "increment" or "path".
         tolerance: f_tol of increment stepping; ``None`` for the criterion's own.
@@ -184,6 +191,8 @@ class Study:
         solvers: Ways to condense.
         ranks: Numbers of processes.
         admits: Which settings are possible at all; ``None`` for every one.
+        refers_to: Cells whose runs the errors are counted from, where no closed form is exact;
+            empty for all. Elements of other theories tend to values of their own.
         title: What the problem is.
         unit: Unit of lengths.
     """
@@ -198,6 +207,7 @@ class Study:
     solvers: tuple[str, ...] = ("auto",)
     ranks: tuple[int, ...] = (1,)
     admits: Callable[[Setting], bool] | None = None
+    refers_to: tuple[str, ...] = ()
     title: str = ""
     unit: str = ""
 

@@ -23,7 +23,7 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import SolverError
 from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF, mumps_message
-from fxcrack.condensation.rigid_motions import motions_of, ways
+from fxcrack.condensation.rigid_motions import held_dofs, motions_of, ways
 from fxcrack.continuum.bodies import Bodies
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.nodes import InterfaceNodes
@@ -88,6 +88,10 @@ class FreeBodies:
         self._unseen = max(_UNSEEN, 64.0 * np.finfo(float).eps * far)
         self._supported = self._at_supports(motions, self._given_supports)
         rows, numbers = self._at_jumps(motions, *self._given_jumps)
+        if self._given_supports.following is not None:
+            more = self._at_constraints(motions, self._given_supports)
+            rows = sp.csr_matrix(sp.vstack([rows, more], format="csr"))
+            numbers = np.concatenate([numbers, np.full(more.shape[0], -1)])
         self._fixed = rows[np.flatnonzero(numbers < 0)]
         order = np.flatnonzero(numbers >= 0)
         self._retained, self._numbers = rows[order], numbers[order]
@@ -95,7 +99,7 @@ class FreeBodies:
     def _at_supports(self, motions: Array, supports: Supports) -> Array:
         """Reduced equations of supports, shape (count, n_motions, n_motions)."""
         layout, m = self._continuum.layout, self._m
-        dofs = np.flatnonzero(supports.which >= 0)
+        dofs = held_dofs(self._continuum, supports)
         body = self._bodies.of_node[dofs // layout.n_unknowns]
         mine = np.zeros((self._bodies.count, m, m))
         for b in np.unique(body):
@@ -140,6 +144,24 @@ class FreeBodies:
             )
             numbers.append(np.where(number[rows, axis] >= 0, number[rows, axis], -1))
         return sp.csr_matrix(sp.vstack(parts, format="csr")), np.concatenate(numbers)
+
+    def _at_constraints(self, motions: Array, supports: Supports) -> sp.csr_matrix:
+        """Equations of dofs that follow others: what they do beside those in rigid motions."""
+        following = supports.following
+        assert following is not None
+        layout, m = self._continuum.layout, self._m
+        body = np.repeat(self._bodies.of_node[: layout.n_owned], layout.n_unknowns)
+        n_here = layout.n_local
+        columns = (m * body[:, None] + np.arange(m)).ravel()
+        spread = sp.csr_matrix(
+            (motions.ravel(), (np.repeat(np.arange(n_here), m), columns)), shape=(n_here, self._n)
+        )
+        rows, local = following.mine(layout)
+        low, high = np.searchsorted(following.masters, [layout.offset, layout.offset + n_here])
+        mine = spread[following.masters[low:high] - layout.offset]
+        masters = sp.vstack(layout.comm.allgather(mine), format="csr")
+        found = spread[local] - following.matrix[rows] @ masters
+        return sp.csr_matrix(sp.vstack(layout.comm.allgather(sp.csr_matrix(found)), format="csr"))
 
     def find(self, free: Ints | None = None) -> str:
         """What can move, in words; empty if supports and bonds hold every body; collective.

@@ -1,10 +1,11 @@
-"""Bodies: parts of the mesh that hang together through their cells, not through interfaces."""
+"""Bodies: parts of the mesh that cells and joints of shells connect, without interfaces."""
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
 from dolfinx import fem
+from mpi4py import MPI
 from scipy.sparse.csgraph import connected_components
 
 from fxcrack.base.arrays import Array, Ints
@@ -57,12 +58,23 @@ class Bodies:
         by_node[:, 0] = label  # a double holds whole numbers up to 2^53
         values.x.scatter_forward()
         same = np.unique(np.stack([label, by_node[:, 0].astype(np.int64)], axis=1), axis=0)
-        a, b = np.concatenate(comm.allgather(same)).T
+        joined = self._joined(label)
+        a, b = np.concatenate([*comm.allgather(same), joined]).T
         total = sum(counts)
         whole = sp.coo_matrix((np.ones(len(a)), (a, b)), shape=(total, total))
         _, group = connected_components(whole, directed=False)
         used = np.unique(np.concatenate(comm.allgather(np.unique(group[label]))))
         return np.asarray(np.searchsorted(used, group[label]))
+
+    def _joined(self, label: Ints) -> Ints:
+        """Labels of the parts that joints of shells connect, shape (n, 2); collective."""
+        joints, layout = self._continuum.layout.joints, self._continuum.layout
+        owned = layout.is_owned(joints.nodes)
+        found = np.zeros(len(joints.nodes), dtype=np.int64)
+        found[owned] = label[layout.to_local(joints.nodes[owned])]
+        self._continuum.comm.Allreduce(MPI.IN_PLACE, found, op=MPI.SUM)
+        pairs = [np.stack([np.full(len(r), found[r[0]]), found[r]], 1) for r in joints.groups()]
+        return np.concatenate(pairs) if pairs else np.zeros((0, 2), dtype=np.int64)
 
     def names(self) -> list[str]:
         """What to call each body: the cell groups that make it up, or where it is; collective."""

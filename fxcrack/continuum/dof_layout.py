@@ -25,6 +25,7 @@ from mpi4py import MPI
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.face import Face
+from fxcrack.continuum.shell_joints import NO_JOINTS
 
 
 class DofLayout:
@@ -46,6 +47,7 @@ class DofLayout:
         n_local: Dofs that this rank owns.
         n_global: Dofs of all ranks.
         offset: First global dof of this rank.
+        joints: Nodes that are kept together without an interface: kinks and T joints of shells.
     """
 
     def __init__(
@@ -62,6 +64,7 @@ class DofLayout:
         self.n_local = self.n_unknowns * n_owned
         self.n_global = self.n_unknowns * int(self.first_nodes[-1])
         self.offset = self.n_unknowns * self.first_node
+        self.joints = NO_JOINTS
 
     def dofs(self, nodes: npt.NDArray[np.integer]) -> Ints:
         """All dofs of nodes.

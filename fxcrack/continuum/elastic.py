@@ -13,7 +13,13 @@ import ufl
 from dolfinx import fem
 
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.kinematics import deformation_gradient, green_lagrange, labelled, tensor
+from fxcrack.continuum.kinematics import (
+    deformation_gradient,
+    green_lagrange,
+    green_lagrange_change,
+    labelled,
+    tensor,
+)
 from fxcrack.continuum.stress import small_stress
 from fxcrack.continuum.term import StoringTerm
 from fxcrack.continuum.thermal_strain import (
@@ -56,6 +62,21 @@ class Elastic(StoringTerm):
                 if self.finite:
                     e -= rise**2 / 2 * square_expansion(c, i)
             total += 0.5 * ufl.inner(ufl.dot(stiffness, e), e) * c.weight * dx
+        return total
+
+    def mean_residual(self, u: fem.Function, begin: fem.Function, v: Any) -> Any:
+        """Forces over an increment whose work is the change of the strain energy, UFL.
+
+        The mean of the second Piola-Kirchhoff stress of both ends acts on the strain of the middle
+        (Simo and Tarnow 1992). Finite strain, no temperature.
+        """
+        c = self._continuum
+        change = green_lagrange_change(c.model, 0.5 * (u + begin), v, c.x)
+        mean = 0.5 * (green_lagrange(c.model, u, c.x) + green_lagrange(c.model, begin, c.x))
+        total = 0
+        for i in self._parts:
+            stiffness, _, dx = c.parts[i]
+            total += ufl.inner(ufl.dot(stiffness, mean), change) * c.weight * dx
         return total
 
     def _shell_energy(self, i: int, strain: Any) -> Any:

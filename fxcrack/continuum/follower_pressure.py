@@ -19,7 +19,7 @@ from fxcrack.base.arrays import Array
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kinematics import Axisymmetric, cofactor
-from fxcrack.continuum.loads import Pressure
+from fxcrack.continuum.loads import AmplitudeLike, Pressure
 from fxcrack.continuum.term import Term
 
 
@@ -45,6 +45,11 @@ class FollowerPressure(Term):
         self._last = np.zeros_like(fem.Function(continuum.space).x.array)
         self._work = 0.0
         self._power: tuple[Any, Any, Any, Any] | None = None
+
+    @property
+    def amplitude(self) -> AmplitudeLike:
+        """Factor in time."""
+        return self._load.amplitude
 
     def residual(self, u: fem.Function, v: Any) -> Any:
         """Minus the forces of the pressure."""

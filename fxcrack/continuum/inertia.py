@@ -39,6 +39,8 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.loads import Field
 from fxcrack.continuum.reduced_integration import whole_measure
+from fxcrack.continuum.section import Section
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.temperature_field import interpolate_given
 from fxcrack.continuum.term import Term
 
@@ -161,6 +163,11 @@ class InertiaForces(Term):
     def __init__(self, continuum: Continuum, effect: Inertia) -> None:
         if effect.lumped and continuum.order != 1:
             raise InputError("Inertia: lumped mass exists for first-order bodies only (order=1)")
+        if effect.rayleigh[1] and isinstance(continuum, ShellBodies):
+            raise InputError(
+                f"Inertia: rayleigh = {effect.rayleigh}: damping by stiffness is not available "
+                "with shells; use damping by mass, rayleigh=(r, 0.0)"
+            )
         if effect.rayleigh[1] and continuum.tied_cells:
             raise InputError(
                 f"Inertia: rayleigh = {effect.rayleigh}: damping by stiffness is not available "
@@ -171,8 +178,7 @@ class InertiaForces(Term):
         self._effect = effect
         domain = continuum.mesh.domain
         self._densities = [
-            fem.Constant(domain, PETSc.ScalarType(_density(effect, m)))
-            for m in continuum.part_materials
+            fem.Constant(domain, _densities(effect, m)) for m in continuum.part_materials
         ]
         self._by_mass, self._by_stiffness = (
             fem.Constant(domain, PETSc.ScalarType(r)) for r in effect.rayleigh
@@ -239,7 +245,7 @@ class InertiaForces(Term):
             dx = whole_measure(dx)
             if self._effect.lumped:
                 dx = dx.reconstruct(metadata={"quadrature_rule": "vertex", "quadrature_degree": 1})
-            total += density * ufl.inner(a, v) * c.weight * dx
+            total += c.mass_density(density, a, v) * c.weight * dx
         return total
 
     def _damping(self, velocity: Any, v: Any) -> Any:
@@ -459,11 +465,16 @@ class InertiaForces(Term):
         self.velocity.x.array[:] = self._last["v"]
 
 
-def _density(effect: Inertia, material: Any) -> float:
-    density = getattr(material, "density", None) if effect.density is None else effect.density
+def _densities(effect: Inertia, material: Any) -> Any:
+    """Density of a part as :meth:`fxcrack.continuum.continuum.Continuum.mass_density` takes it."""
+    density: Any
+    if isinstance(material, Section):
+        density = material.mass(effect.density)
+    else:
+        density = getattr(material, "density", None) if effect.density is None else effect.density
     if density is None:
         raise InputError(
             f"Inertia: {material} has no density; give Inertia(density=...) or density= in the "
             "material"
         )
-    return float(density)
+    return np.asarray(density, dtype=PETSc.ScalarType)

@@ -1,7 +1,9 @@
 """Internal forces of the bodies in explicit dynamics: a sparse product, or assembly.
 
 Linear bodies may use either; which is faster depends on element and machine and is found out by
-timing both. Nonlinear bodies assemble their residual and nothing else.
+timing both. Nonlinear bodies assemble their residual and nothing else. The temperature of linear
+bodies is a load (:class:`fxcrack.continuum.thermal_strain.ThermalLoad`), so that they take the
+product; that of others is in their residual.
 """
 
 from __future__ import annotations
@@ -22,8 +24,11 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kernels import fast_form
+from fxcrack.continuum.stress import cell_means
 from fxcrack.continuum.term import Term
+from fxcrack.continuum.thermal_strain import is_linear
 
 _NO_FORM = object()
 _TRIALS = 5
@@ -79,8 +84,10 @@ class InternalForces:
 
     Attributes:
         u: The displacement, ghosts up to date.
-        linear: Whether forces are linear in the displacement: elasticity alone, at constant
-            temperature or none.
+        linear: Whether forces are linear in the displacement: elasticity alone, whose moduli stay.
+        finite: Whether they may turn and stretch by any amount.
+        path_dependent: Whether energies follow from the states passed: plasticity, or a
+            temperature that changes in nonlinear bodies.
         choice: Which operator is used; set by :meth:`choose`.
         evaluations: How often forces were evaluated.
     """
@@ -89,7 +96,12 @@ class InternalForces:
         self.continuum = continuum
         self.terms = list(terms)
         self.u = fem.Function(continuum.space, name="displacement")
-        self.linear = all(t.constant for t in terms) and continuum.temperature is None
+        field = continuum.temperature
+        self.linear = all(t.constant for t in terms) and is_linear(continuum)
+        heated = field is not None and not self.linear and not field.effect.steady
+        self.finite = not self.linear and any(t.finite for t in terms)
+        self._yields = any(t.path_dependent for t in terms)
+        self.path_dependent = heated or self._yields
         self.evaluations = 0
         self.choice = OperatorChoice("assembly", "nothing else was chosen", {})
         self._by_cells = [t for t in terms if t.by_cells]
@@ -117,9 +129,13 @@ class InternalForces:
             "product": self._product,
             "assembly": self._assembled,
         }
+        if self.continuum.temperature is not None:
+            operator, why = "product", "the temperature of linear bodies is a load"
+        else:
+            why = "it was asked for"
         if operator != "auto":
             self._evaluate = candidates[operator]
-            self.choice = OperatorChoice(operator, "it was asked for", {})
+            self.choice = OperatorChoice(operator, why, {})
             self._evaluate()
             return
         seconds = {}
@@ -171,6 +187,61 @@ class InternalForces:
             self._vector.x.scatter_reverse(dolfinx.la.InsertMode.add)
         return np.asarray(values[: self.continuum.n_local])
 
+    # -- states passed -------------------------------------------------------------------
+
+    def begin(self, time: float) -> None:
+        """Set the time of the displacement: temperatures of nonlinear bodies; collective."""
+        if not self.linear:
+            for term in self.terms:
+                term.begin(time, 0.0)
+
+    def commit(self) -> None:
+        """Keep the state that belongs to the last :meth:`forces`; collective."""
+        if self.path_dependent:
+            for term in self.terms:
+                term.commit(self.u)
+
+    def spent(self) -> dict[str, float]:
+        """Energies dissipated up to the last commit by name, force x length; collective."""
+        out: dict[str, float] = {}
+        for term in self.terms:
+            for name, value in term.spent().items():
+                out[name] = out.get(name, 0.0) + value
+        return out
+
+    def work(self) -> float:
+        """Work of the temperature of nonlinear bodies up to the last commit, force x length."""
+        return 0.0 if self.linear else sum(term.work() for term in self.terms)
+
+    def state(self) -> dict[str, Array]:
+        """Committed state of the terms of this rank, as copies; shapes as in :meth:`Term.state`."""
+        if not self.path_dependent:
+            return {}
+        named = [(i, t.state()) for i, t in enumerate(self.terms)]
+        return {f"{i}.{k}": np.array(v) for i, state in named for k, v in state.items()}
+
+    def places(self) -> dict[str, Place]:
+        """Where the arrays of :meth:`state` are defined."""
+        named = [(i, t.places()) for i, t in enumerate(self.terms)]
+        return {f"{i}.{k}": place for i, places in named for k, place in places.items()}
+
+    def restore(self, state: dict[str, Array]) -> None:
+        """Set the committed state from :meth:`state`, arrays of the same shapes."""
+        if self.path_dependent:
+            for i, term in enumerate(self.terms):
+                start = f"{i}."
+                mine = {k[len(start) :]: v for k, v in state.items() if k.startswith(start)}
+                term.restore(mine)
+
+    def stress(self) -> fem.Function:
+        """Cauchy stress of nonlinear bodies at :attr:`u`, means of cells; collective.
+
+        Components in the order of ``model.stress_labels``, force/length^2.
+        """
+        for term in self._changing:
+            term.update(self.u)
+        return cell_means(self.continuum, [p for t in self.terms for p in t.stresses(self.u)])
+
     # -- forces and energies -------------------------------------------------------------
 
     def forces(self) -> Array:
@@ -194,10 +265,11 @@ class InternalForces:
         """
         x, n, comm = self.u.x, self.continuum.n_local, self.continuum.comm
         before = x.array.copy()
-        if self.linear:
+        if self.linear or self._yields:
             x.array[:n] = direction
             x.scatter_forward()
-            out = self.forces().copy()
+            # bodies that yield are stiffest where they do not: in unloading
+            out = self._product() if self._yields else self.forces().copy()
         else:
             # a motion far below any displacement that matters, far above round-off
             scale = comm.allreduce(float(np.abs(direction).max(initial=0.0)), op=MPI.MAX)

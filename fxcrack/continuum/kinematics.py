@@ -201,6 +201,23 @@ def green_lagrange(model: Model, u: Any, x: Any) -> Any:
     return model.strain(u, x) + ufl.as_vector(quadratic)
 
 
+def green_lagrange_change(model: Model, u: Any, v: Any, x: Any) -> Any:
+    """Change of :func:`green_lagrange` at u per unit of a displacement v, linear in v.
+
+    Halfway between two displacements, with their difference for v, it is the difference of their
+    strains, as strains are quadratic.
+    """
+    g, h = ufl.grad(u), ufl.grad(v)
+    square = g.T * h
+    n = model.gdim
+    quadratic = [square[i, i] for i in range(n)]
+    if isinstance(model, Axisymmetric):
+        quadratic.append(u[0] * v[0] / x[0] ** 2)
+    shears = [(1, 2), (0, 2), (0, 1)] if n == 3 else [(0, 1)]
+    quadratic += [square[i, j] + square[j, i] for i, j in shears]
+    return model.strain(v, x) + ufl.as_vector(quadratic)
+
+
 def deformation_gradient(model: Model, u: Any, x: Any) -> Any:
     """F = 1 + grad u, shape (3, 3); out of the plane the stretch is 1, in a ring 1 + u_r/r."""
     f = ufl.Identity(model.gdim) + ufl.grad(u)
@@ -208,6 +225,15 @@ def deformation_gradient(model: Model, u: Any, x: Any) -> Any:
         return f
     out = 1 + u[0] / x[0] if isinstance(model, Axisymmetric) else 1
     return ufl.as_matrix([[f[0, 0], f[0, 1], 0], [f[1, 0], f[1, 1], 0], [0, 0, out]])
+
+
+def displacement_gradient(model: Model, u: Any, x: Any) -> Any:
+    """F - 1, linear in u, shape (3, 3)."""
+    g = ufl.grad(u)
+    if model.gdim == 3:
+        return g
+    out = u[0] / x[0] if isinstance(model, Axisymmetric) else 0
+    return ufl.as_matrix([[g[0, 0], g[0, 1], 0], [g[1, 0], g[1, 1], 0], [0, 0, out]])
 
 
 def cofactor(f: Any) -> Any:

@@ -8,7 +8,7 @@ kinematic model; a point force is shared equally by the nodes of its group.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Protocol
 
 import dolfinx.fem.petsc
 import numpy as np
@@ -34,6 +34,15 @@ from fxcrack.continuum.loads import (
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.shell_forces import shell_load
 from fxcrack.continuum.thermal_strain import ThermalLoad, load_form
+
+
+class NodalLoad(Protocol):
+    """A load that knows its nodal forces, such as a pressure on both faces of an interface."""
+
+    title: str
+
+    def vector(self, continuum: Continuum) -> PETSc.Vec:
+        """Nodal forces at amplitude 1; collective; the caller destroys the vector."""
 
 
 class LoadPattern:
@@ -63,7 +72,7 @@ class LoadPattern:
         return out
 
 
-def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
+def load_vector(continuum: Continuum, load: Load | ThermalLoad | NodalLoad) -> PETSc.Vec:
     """Nodal forces of a load at amplitude 1; collective.
 
     Args:
@@ -76,6 +85,8 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad) -> PETSc.Vec:
     Raises:
         InputError: The load has the wrong number of components, or its group does not fit.
     """
+    if hasattr(load, "vector"):
+        return load.vector(continuum)
     if isinstance(continuum, ShellBodies):
         vector = shell_load(continuum, load)
         if vector is not None:

@@ -21,67 +21,23 @@ from fxcrack.base.checks import (
     list_of,
     number_or_function,
     numbers,
-    table,
     text,
 )
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.amplitudes import (
+    Amplitude,
+    AmplitudeLike,
+    Integral,
+    Ramp,
+    SmoothStep,
+    constant,
+)
 from fxcrack.continuum.face import Face
 
 Field = float | Callable[[Array], Array]
 """A number, or a function of positions, shape (3, n), that returns shape (n,)."""
 
-
-@dataclass(frozen=True)
-class Amplitude:
-    """Piecewise linear factor in time, held constant outside the table.
-
-    Args:
-        times: Increasing times.
-        values: Factor at those times.
-    """
-
-    times: tuple[float, ...]
-    values: tuple[float, ...]
-
-    def __post_init__(self) -> None:
-        """Check the table."""
-        n, m = (len(list_of(v) or ()) for v in (self.times, self.values))
-        if n != m or not n:
-            raise InputError(
-                f"Amplitude: {n} times but {m} values; give as many of one as of the other, at "
-                "least one"
-            )
-        times, values = table("Amplitude", ("times", "values"), self.times, self.values)
-        keep(self, times=times, values=values)
-
-    def __call__(self, time: float) -> float:
-        """Factor at a time."""
-        return float(np.interp(time, self.times, self.values))
-
-    def breaks(self) -> tuple[float, ...]:
-        """Times at which the slope changes."""
-        return self.times
-
-
-@dataclass(frozen=True)
-class Ramp:
-    """The factor is the time itself, without end: the default amplitude."""
-
-    def __call__(self, time: float) -> float:
-        """Factor at a time."""
-        return float(time)
-
-    def breaks(self) -> tuple[float, ...]:
-        """No change of slope."""
-        return ()
-
-
-def constant(value: float = 1.0) -> Amplitude:
-    """An amplitude that is there from the first moment and stays."""
-    return Amplitude((0.0,), (value,))
-
-
-AmplitudeLike = Amplitude | Ramp
+_RAMP = Ramp()
 
 
 @dataclass(frozen=True)
@@ -101,7 +57,7 @@ class Displacement:
     x: Field | None = None
     y: Field | None = None
     z: Field | None = None
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -121,6 +77,35 @@ class Displacement:
         """Name in the history."""
         return self.name or self.where
 
+    @classmethod
+    def by_velocity(
+        cls, where: str, *, amplitude: Amplitude | SmoothStep | Integral | None = None,
+        **others: Any,
+    ) -> Displacement:  # fmt: skip
+        """A support that moves with a velocity, from no displacement at time 0.
+
+        Args:
+            where: Name of a group.
+            amplitude: Factor on the velocity in time; constant by default.
+            **others: x, y, z, here velocities in length/time, and name.
+        """
+        return cls(where, amplitude=Integral(constant() if amplitude is None else amplitude),
+                   **others)  # fmt: skip
+
+    @classmethod
+    def by_acceleration(
+        cls, where: str, *, amplitude: Amplitude | SmoothStep, **others: Any
+    ) -> Displacement:
+        """A support that moves with an acceleration, from rest and no displacement at time 0.
+
+        Args:
+            where: Name of a group.
+            amplitude: Factor on the acceleration in time; its table ends with 0, after which the
+                velocity stays.
+            **others: x, y, z, here accelerations in length/time^2, and name.
+        """
+        return cls(where, amplitude=Integral(Integral(amplitude)), **others)
+
 
 @dataclass(frozen=True)
 class Traction:
@@ -138,7 +123,7 @@ class Traction:
 
     where: str | Face
     value: tuple[Field, ...]
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -158,19 +143,24 @@ class Pressure:
     """Pressure on a named facet group, positive when it pushes into the body.
 
     Args:
-        where: Name of a facet group, or a face of a shell (:class:`fxcrack.Face`).
+        where: Name of a facet group, or a face of a shell (:class:`fxcrack.Face`); with
+            ``follows_crack`` the name of an interface, or of one of its two surfaces.
         value: Force/length^2, a number or a function of (undeformed) position.
         amplitude: Factor in time.
         name: What the history calls it.
         follows: Stay normal to the deformed facets and act on their deformed area, instead of
             keeping direction and size.
+        follows_crack: Act on both faces of an interface wherever it is open, also on what the crack
+            opens later on, as a fluid does that fills the crack at once. The conjugate displacement
+            ``v[..]`` in the history is the volume between the faces times ``value``.
     """
 
     where: str | Face
     value: Field
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
     follows: bool = False
+    follows_crack: bool = False
 
     def __post_init__(self) -> None:
         """Check names and value."""
@@ -178,6 +168,14 @@ class Pressure:
         owner = f"load '{self.title}'"
         number_or_function(owner, "value", self.value)
         keep(self, follows=flag(owner, "follows", self.follows))
+        keep(self, follows_crack=flag(owner, "follows_crack", self.follows_crack))
+        if self.follows and self.follows_crack:
+            raise InputError(
+                f"{owner}: follows (deformed facets) and follows_crack (facets that open) exclude "
+                "each other; give one of them"
+            )
+        if self.follows_crack and isinstance(self.where, Face):
+            raise InputError(f"{owner}: follows_crack is not possible in shells; use solids")
 
     @property
     def title(self) -> str:
@@ -198,7 +196,7 @@ class BodyForce:
 
     value: tuple[Field, ...]
     where: str | None = None
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -227,7 +225,7 @@ class PointForce:
 
     where: str
     value: tuple[Field, ...]
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -285,7 +283,7 @@ class Moment:
 
     where: str
     value: tuple[Field, ...]
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -313,7 +311,7 @@ class PointMoment:
 
     where: str
     value: tuple[float, ...]
-    amplitude: AmplitudeLike = Ramp()
+    amplitude: AmplitudeLike = _RAMP
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -372,3 +370,21 @@ class Monitor:
     def terms(self) -> list[Monitor]:
         """This monitor and all that are added to it."""
         return [self, *(term for monitor in self.plus for term in monitor.terms)]
+
+
+__all__ = [
+    "Amplitude",
+    "AmplitudeLike",
+    "BodyForce",
+    "Displacement",
+    "Field",
+    "Load",
+    "Moment",
+    "Monitor",
+    "PointForce",
+    "PointMoment",
+    "Pressure",
+    "Ramp",
+    "Traction",
+    "constant",
+]

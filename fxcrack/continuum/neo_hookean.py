@@ -16,9 +16,18 @@ from petsc4py import PETSc
 
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.kinematics import PlaneStress, deformation_gradient, labelled
+from fxcrack.continuum.kinematics import (
+    PlaneStress,
+    cofactor,
+    deformation_gradient,
+    displacement_gradient,
+    labelled,
+)
 from fxcrack.continuum.term import StoringTerm
 from fxcrack.continuum.thermal_strain import expansion
+
+_CLOSE = 0.05
+"""Where the difference over the sum is less, a series to its 10th power is exact to 1e-17."""
 
 
 class NeoHookeanBodies(StoringTerm):
@@ -51,6 +60,28 @@ class NeoHookeanBodies(StoringTerm):
             total += stretch**3 * density(f, mu, lame) * c.weight * c.parts[i][2]
         return total
 
+    def mean_residual(self, u: fem.Function, begin: fem.Function, v: Any) -> Any:
+        """Forces over an increment whose work is the change of the strain energy, UFL.
+
+        With C = F^t F and j = det C, W = mu/2 (tr C - 3) + phi(j): the mean of the cofactor of C
+        by Simpson's rule times the change of C is the change of j, and phi has a difference
+        quotient. No temperature.
+        """
+        c = self._continuum
+        change = displacement_gradient(c.model, v, c.x)
+        total = 0
+        for i in self._parts:
+            first, _, mu, lame = self._elastic_part(begin, i)
+            last, _, _, _ = self._elastic_part(u, i)
+            middle = 0.5 * (first + last)
+            c0, c1 = first.T * first, last.T * last
+            mean = (cofactor(c0) + 4 * cofactor(0.5 * (c0 + c1)) + cofactor(c1)) / 6
+            j0, j1 = ufl.det(c0), ufl.det(c1)
+            slope = _log_quotient(j0, j1) * (-mu / 2 + lame / 8 * (ufl.ln(j0) + ufl.ln(j1)))
+            stress = mu * ufl.Identity(3) + 2 * slope * mean
+            total += ufl.inner(middle * stress, change) * c.weight * c.parts[i][2]
+        return total
+
     def _elastic_part(self, u: fem.Function, i: int) -> tuple[Any, Any, Any, Any]:
         """Elastic deformation gradient, thermal stretch and the two moduli of a part."""
         c = self._continuum
@@ -81,3 +112,19 @@ def density(f: Any, mu: Any, lame: Any) -> Any:
     """Energy per undeformed volume at a deformation gradient of shape (3, 3)."""
     log_j = ufl.ln(ufl.det(f))
     return mu / 2 * (ufl.inner(f, f) - 3 - 2 * log_j) + lame / 2 * log_j**2
+
+
+def _log_quotient(a: Any, b: Any) -> Any:
+    """(ln b - ln a)/(b - a), also where a and b are close, by 2/(a + b) artanh(r)/r."""
+    r = (b - a) / (b + a)
+    square = r**2
+    series = 1 + square * (
+        1 / 3 + square * (1 / 5 + square * (1 / 7 + square * (1 / 9 + square / 11)))
+    )
+    far = ufl.gt(square, _CLOSE**2)
+    # neither branch may divide by zero
+    return 2 / (a + b) * ufl.conditional(far, _artanh_over(ufl.conditional(far, r, 0.5)), series)
+
+
+def _artanh_over(r: Any) -> Any:
+    return ufl.ln((1 + r) / (1 - r)) / (2 * r)

@@ -10,7 +10,8 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.checks import one_of
 from fxcrack.base.errors import InputError
 from fxcrack.base.positions import numbers_at
-from fxcrack.continuum.loads import AmplitudeLike, Field, Ramp
+from fxcrack.continuum.amplitudes import AmplitudeLike, Ramp
+from fxcrack.continuum.loads import Field
 
 _RAMP = Ramp()
 

@@ -117,22 +117,61 @@ class Section:
         a, b, d = self.laminate.moments(2, self.offset) * np.outer(factor, factor)
         return np.block([[a, b], [b, d]])
 
-    def mass(self) -> Array | None:
+    def mass(self, density: float | None = None) -> Array | None:
         """Moments of the density, int rho (1, z, z^2) dz.
 
-        Shape (3,); ``None`` where a density is missing.
+        Args:
+            density: Of all plies, mass/volume; their own by default.
+
+        Returns:
+            Shape (3,), mass/length^2 and what follows; ``None`` where a density is missing.
         """
-        plies = self.laminate.plies
-        densities = [getattr(p.material, "density", None) for p in plies]
+        densities = [
+            density if density is not None else getattr(p.material, "density", None)
+            for p in self.laminate.plies
+        ]
         if any(d is None for d in densities):
             return None
-        z = self.laminate.interfaces(self.offset)
         rho = np.array(densities, dtype=float)
-        return np.array([float(rho @ np.diff(z**n)) / n for n in (1, 2, 3)])
+        return np.array([float(rho @ w) for w in self._weights()])
+
+    def thermal_expansion(self) -> Array:
+        """Mean thermal strain per degree of the plies as one body, shape (6,), 1/temperature."""
+        return self.laminate.thermal_expansion()
+
+    def thermal_strains(self) -> list[Array]:
+        """Thermal strain per degree of each ply in the axes of the section, each of shape (6,).
+
+        The strain across a shell is linear over its thickness and cannot jump between plies, which
+        do not press on each other. So across a ply it is the strain at which its own thermal
+        stress vanishes, plus what the expansions across exceed that by in the mean of all plies;
+        in a section of one material it is the expansion of the material.
+        """
+        plies = self.laminate.plies
+        stiffness = [p.stiffness() for p in plies]
+        strains = [p.thermal_expansion().copy() for p in plies]
+        excess = [c[2] @ e / c[2, 2] for c, e in zip(stiffness, strains, strict=True)]
+        mean = float(np.dot(excess, [p.thickness for p in plies])) / self.height
+        for e, own in zip(strains, excess, strict=True):
+            e[2] += mean - own
+        return strains
+
+    def thermal_squares(self) -> Array:
+        """Moments int (1, z, z^2) e . C e dz of the thermal strains e, shape (3,)."""
+        e = self.thermal_strains()
+        square = [s @ p.stiffness() @ s for s, p in zip(e, self.laminate.plies, strict=True)]
+        return np.array([float(np.dot(square, w)) for w in self._weights()])
+
+    def _weights(self) -> list[Array]:
+        """Integrals of 1, z and z^2 over each ply, each of shape (n_plies,)."""
+        z = self.laminate.interfaces(self.offset)
+        return [np.diff(z**n) / n for n in (1, 2, 3)]
 
     def thermal_forces(self) -> Array:
         """Thermal stress resultants (N, M) of a temperature rise of 1 and of z, shape (2, 12)."""
-        first, second, third = self.laminate.thermal_moments(2, self.offset)
+        e = self.thermal_strains()
+        stress = [p.stiffness() @ s for s, p in zip(e, self.laminate.plies, strict=True)]
+        first, second, third = (w @ np.array(stress) for w in self._weights())
         return np.stack([np.append(first, second), np.append(second, third)])
 
 

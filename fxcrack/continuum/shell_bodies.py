@@ -35,6 +35,7 @@ from fxcrack.continuum.shell_frames import (
     nodal_directors,
     section_axes,
 )
+from fxcrack.continuum.shell_joints import find_joints
 from fxcrack.continuum.shell_layout import ShellLayout
 from fxcrack.continuum.shell_strains import ShellElement, shell_element
 from fxcrack.continuum.strain_cells import StrainCells
@@ -53,6 +54,7 @@ class ShellPart:
         axes: Axes of the section at the integration points, rows, shape (n_cells, n_points, 3, 3).
         area: Area each integration point stands for, of the rule of the bending energy (0 at
             points of another rule), shape (n_cells, n_points), length^2.
+        soft: The same of the rules of all other energy, weighted as they are.
         strain_cells: Strains, stiffness and energy of the cells; strains e0 and e1 per point.
     """
 
@@ -61,6 +63,7 @@ class ShellPart:
     nodes: Ints
     axes: Array
     area: Array
+    soft: Array
     strain_cells: StrainCells
 
 
@@ -82,7 +85,8 @@ class ShellBodies(Continuum):
 
     Raises:
         InputError: A cell shape or order that does not exist, sections that do not cover the
-            cells once, an axis across the shell, a kink, a surface with one side.
+            cells once, an axis across the shell, a kink whose smooth parts share their nodes, a
+            surface with one side.
     """
 
     layout: ShellLayout
@@ -96,9 +100,7 @@ class ShellBodies(Continuum):
         order: int | None = None,
         temperature: Temperature | None = None,
     ) -> None:
-        if temperature is not None:
-            raise InputError("Temperature is not possible in shells; model the part with solids")
-        super().__init__(mesh, materials, model, order=order)
+        super().__init__(mesh, materials, model, order=order, temperature=temperature)
         self.shell = model
         kind = mesh.domain.topology.cell_name()
         if kind == "triangle" and self.order == 2:
@@ -113,6 +115,7 @@ class ShellBodies(Continuum):
         self.signs = cell_signs(mesh, self._upward(n_cells))
         self.directors = nodal_directors(self.space, self._normals_at_nodes(), mesh.name)
         self.layout = ShellLayout(self.comm, self.directors, self.layout.n_owned, self.height)
+        self.layout.joints = find_joints(mesh, self.space, self.order, self.directors)
         self.shell_parts = [
             self._part(s, c) for s, c in zip(self.sections, self.part_cells, strict=True)
         ]
@@ -197,7 +200,7 @@ class ShellBodies(Continuum):
         if self.shell.enhanced_membrane and nodes.shape[1] == 4:
             enhanced.append(self._membrane_modes(x, sign, section, jacobian))
         return ShellPart(
-            section, np.asarray(cells, dtype=np.int64), nodes, axes, weight * rule,
+            section, np.asarray(cells, dtype=np.int64), nodes, axes, weight * rule, soft,
             StrainCells(vectors, element.matrices, local, np.concatenate(enhanced, -1), moduli),
         )  # fmt: skip
 
@@ -258,7 +261,8 @@ class ShellBodies(Continuum):
         if found[-1] - found[0] > 1e-12 * max(abs(found[0]), abs(found[-1])):
             raise InputError(
                 f"Face '{face}': its cells belong to sections whose {face.side} lies at z = "
-                f"{found[0]:g} and at {found[-1]:g}; name a face of one section"
+                f"{found[0]:g} and at {found[-1]:g}; name a face of one section, or give the "
+                "sections offsets that put this side at one height"
             )
         return float(found[0])
 
@@ -267,6 +271,15 @@ class ShellBodies(Continuum):
         out = fem.Function(self.space)
         out.x.array.reshape(-1, 6)[:, 3:] = self.directors
         return out
+
+    def mass_density(self, density: Any, a: Any, v: Any) -> Any:
+        """Virtual work of the inertia per area, int rho (a + z a_w) . (v + z v_w) dz; UFL."""
+        on_u, on_w = (ufl.as_vector([a[i + k] for i in range(3)]) for k in (0, 3))
+        u, w = (ufl.as_vector([v[i + k] for i in range(3)]) for k in (0, 3))
+        mixed = ufl.inner(on_u, w) + ufl.inner(on_w, u)
+        return (
+            density[0] * ufl.inner(on_u, u) + density[1] * mixed + density[2] * ufl.inner(on_w, w)
+        )
 
     def change_of_director(self, q: Any) -> Any:
         """UFL change of the director among the unknowns."""

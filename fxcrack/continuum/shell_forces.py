@@ -14,7 +14,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import dolfinx.fem.petsc
+import dolfinx.mesh
 import numpy as np
+import numpy.typing as npt
 import ufl
 from dolfinx import fem
 from petsc4py import PETSc
@@ -32,6 +34,8 @@ from fxcrack.continuum.loads import (
     Traction,
 )
 from fxcrack.continuum.shell_bodies import ShellBodies, ShellPart
+from fxcrack.continuum.shell_temperature import ShellTemperature
+from fxcrack.continuum.thermal_strain import ThermalLoad
 
 
 def shell_load(shell: ShellBodies, load: Any) -> PETSc.Vec | None:
@@ -48,6 +52,10 @@ def shell_load(shell: ShellBodies, load: Any) -> PETSc.Vec | None:
     Raises:
         InputError: The load does not fit shells.
     """
+    if isinstance(load, ThermalLoad):
+        forces = ShellTemperature(shell).forces(load.pattern)
+        nodes = [p.nodes for p in shell.shell_parts]
+        return cell_vector(shell.space, list(zip(nodes, forces, strict=True)))
     if isinstance(load, PointMoment):
         return _point_moment(shell, load)
     if isinstance(load, Moment):
@@ -85,6 +93,27 @@ def _check_border(shell: ShellBodies, where: str, title: str) -> None:
         if inside
         else None,
     )
+    if len(shell.mesh.joints):
+        _check_no_joint(shell, edges, title)
+
+
+def _check_no_joint(shell: ShellBodies, edges: npt.NDArray[np.int32], title: str) -> None:
+    """Refuse edges at which shells meet, each of which has one: they would be loaded twice."""
+    domain, joints = shell.mesh.domain, shell.mesh.joints
+    domain.topology.create_connectivity(1, 2)
+    mine = edges[edges < domain.topology.index_map(1).size_local]
+    points = dolfinx.mesh.entities_to_geometry(domain, 1, mine)[:, :2].reshape(-1, 2)
+    node = np.asarray(domain.geometry.input_global_indices)[points]
+    by_node = np.argsort(joints[:, 0])
+    place = np.minimum(np.searchsorted(joints[by_node, 0], node), len(joints) - 1)
+    place = by_node[place]
+    place = np.where(joints[place, 0] == node, -1 - joints[place, 1], node)
+    ends = np.concatenate(shell.comm.allgather(np.sort(place, axis=1)))
+    if len(np.unique(ends, axis=0)) < len(ends):
+        raise InputError(
+            f"load '{title}': shells meet at some of its edges, and each has an edge there; give a "
+            "PointForce, or a group of edges that ends before the joint"
+        )
 
 
 def _check_three(value: Sequence[Any], title: str) -> None:

@@ -134,7 +134,8 @@ def nodal_directors(space: fem.FunctionSpace, normals: Array, title: str) -> Arr
         problem = (
             f"mesh '{title}': the shell has a kink at {format_point(x)}, where normals of cells "
             f"differ from the director by {np.degrees(np.arccos(cosine.min())):.0f} degrees; use "
-            "smaller cells if the surface is smooth there"
+            "smaller cells if the surface is smooth there; at the edge of two smooth parts, give "
+            "each nodes of its own, as meshes that fxcrack reads have"
         )
     raise_on_all_ranks(compat.plain_comm(space.mesh.comm), problem)
     return np.asarray(d)

@@ -47,6 +47,7 @@ class ShellElement:
         matrices: Of the covariant strains, shape (n_points, 9, 2 n_nodes, 2 n_nodes).
         centre_gradients: Derivatives of the shape functions at the middle, shape (2, n_nodes).
         node_gradients: Derivatives at the nodes, shape (2, n_nodes, n_nodes).
+        corners: Vertices of the reference cell, shape (3 or 4, 2).
     """
 
     values: Array
@@ -58,6 +59,7 @@ class ShellElement:
     matrices: Array
     centre_gradients: Array
     node_gradients: Array
+    corners: Array
 
 
 @lru_cache(maxsize=8)
@@ -102,7 +104,7 @@ def shell_element(kind: str, order: int) -> ShellElement:
     at_nodes = tabulate(np.asarray(element.points))[1]
     return ShellElement(
         values, gradients, points, weights, soft, bending, matrices, tabulate(middle)[1][:, 0],
-        at_nodes,
+        at_nodes, np.asarray(basix.geometry(element.cell_type)),
     )  # fmt: skip
 
 

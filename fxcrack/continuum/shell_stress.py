@@ -13,6 +13,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.shell_bodies import ShellBodies, ShellPart
+from fxcrack.continuum.shell_temperature import ShellTemperature
 
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
@@ -39,33 +40,40 @@ def shell_stress(shell: ShellBodies, q: Array, *, finite: bool = False) -> list[
     Args:
         shell: The shells.
         q: Unknowns of the local nodes, ghosts too, shape (6 n_local_nodes,).
+            The temperature is the present one.
         finite: Green-Lagrange strains and second Piola-Kirchhoff stresses, along the undeformed
             axes.
     """
     vectors = q.reshape(-1, 2, 3)
     out = []
-    for part in shell.shell_parts:
+    temperature = None if shell.temperature is None else ShellTemperature(shell)
+    for i, part in enumerate(shell.shell_parts):
         change = vectors[part.nodes].reshape(len(part.nodes), 2 * part.nodes.shape[1], 3)
-        e = part.strain_cells.strains(change, finite=finite)
+        given = None if temperature is None else temperature.stress(i)
+        e = part.strain_cells.strains(change, finite=finite, stress=given)
         share = part.area / part.area.sum(axis=1, keepdims=True)
         axes = part.axes
+        rise = np.zeros((*e.shape[:2], 2)) if temperature is None else temperature.values(i)
         faces = [
-            np.einsum("cp,cpi->ci", share, _global(_at_face(part, e, side), axes))
+            np.einsum("cp,cpi->ci", share, _global(_at_face(part, e, rise, side), axes))
             for side in ("bottom", "top")
         ]
         mean = np.einsum("cp,cpi->ci", share, e)
         forces = mean @ part.section.stiffness().T
+        forces -= np.einsum("cp,cpi->ci", share, rise) @ part.section.thermal_forces()
         out.append(ShellStress(mean, forces, np.stack(faces)))
     return out
 
 
-def _at_face(part: ShellPart, e: Array, side: str) -> Array:
+def _at_face(part: ShellPart, e: Array, rise: Array, side: str) -> Array:
     """Stress in the axes of the section on a face, shape (n_cells, n_points, 6)."""
     section = part.section
     ply = section.laminate.plies[-1 if side == "top" else 0]
     z = section.face(side)
     strain = e[..., :6] + z * e[..., 6:]
     stress = strain @ ply.stiffness()
+    held = ply.stiffness() @ section.thermal_strains()[-1 if side == "top" else 0]
+    stress -= (rise[..., :1] + z * rise[..., 1:]) * held
     stress[..., 3:5] = 0.0
     return np.asarray(stress)
 

@@ -25,7 +25,7 @@ from fxcrack.base.checks import (
     shown,
 )
 from fxcrack.base.errors import InputError
-from fxcrack.continuum.loads import Amplitude, AmplitudeLike, Ramp
+from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, Ramp
 from fxcrack.continuum.materials import Material
 
 Spatial = float | Callable[[Array], Array] | Any

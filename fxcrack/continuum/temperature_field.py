@@ -24,7 +24,7 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.positions import numbers_at
-from fxcrack.continuum.loads import AmplitudeLike
+from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.temperature import ByTemperature, Spatial, Temperature
 

@@ -84,6 +84,9 @@ class Term:
     def begin(self, time: float, dt: float) -> None:
         """An increment of dt ends at a time: set what depends on them; collective."""
 
+    def begin_at(self, u: fem.Function) -> None:
+        """Bodies with inertia begin their motion at u, which loads at rest brought; collective."""
+
     def update(self, u: fem.Function) -> None:
         """A new trial u was set: update what is stored at quadrature points; collective."""
 

@@ -19,11 +19,13 @@ from mpi4py import MPI
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStress
 from fxcrack.continuum.laminate import square_strain
-from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.shell_bodies import ShellBodies
+from fxcrack.continuum.shell_temperature import ShellTemperature
 from fxcrack.continuum.temperature import ByTemperature, expansion_of
 from fxcrack.continuum.temperature_field import TemperatureField, entries
 
@@ -90,6 +92,8 @@ def held_energies(continuum: Continuum) -> Array:
     Returns:
         The symmetric matrix E, shape (n_patterns, n_patterns), force x length.
     """
+    if isinstance(continuum, ShellBodies):
+        return ShellTemperature(continuum).held_energies()
     field = _field_of(continuum)
     n = len(field.patterns)
     out = np.zeros((n, n))

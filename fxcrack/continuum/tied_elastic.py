@@ -41,14 +41,14 @@ class TiedElastic(Term):
             _, found = part.forces(part.changes(u), finite=self.finite)
             add_forces(forces, part.nodes, found)
 
-    def add_tangent(self, matrix: PETSc.Mat, u: fem.Function) -> None:
-        """Add the tangents of the cells."""
+    def add_tangent(self, matrix: PETSc.Mat, u: fem.Function, factor: float = 1.0) -> None:
+        """Add the tangents of the cells, times a factor."""
         for part in self._parts:
             if self.finite:
                 response = part.strain_cells.respond(part.changes(u), finite=True)
-                add_matrices(matrix, part.nodes, response.tangent)
+                add_matrices(matrix, part.nodes, factor * response.tangent)
             else:
-                add_matrices(matrix, part.nodes, part.strain_cells.stiffness())
+                add_matrices(matrix, part.nodes, factor * part.strain_cells.stiffness())
 
     def stored(self, u: fem.Function) -> float:
         """Strain energy of the cells that this rank owns."""

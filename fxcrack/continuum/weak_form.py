@@ -204,10 +204,13 @@ class WeakForm:
     def stored(self) -> dict[str, float]:
         """Energies stored at the present displacement by name, force x length; collective."""
         self.compile()
-        mine = {name: fem.assemble_scalar(form) for name, form in self._energies.items()}
+        known = [t.energy_name for t in self.terms if t.by_cells or t.energy_name in self._energies]
+        mine = dict.fromkeys(known, 0.0)
+        for name, form in self._energies.items():
+            mine[name] = fem.assemble_scalar(form)
         for term in self.terms:
             if term.by_cells:
-                mine[term.energy_name] = mine.get(term.energy_name, 0.0) + term.stored(self.u)
+                mine[term.energy_name] += term.stored(self.u)
         comm = self.continuum.comm
         return {name: float(comm.allreduce(x, op=MPI.SUM)) for name, x in mine.items()}
 
@@ -245,6 +248,11 @@ class WeakForm:
         for term in self.terms:
             term.begin(time_end, dt)
             term.update(self.u)
+
+    def begin_at(self) -> None:
+        """Begin a motion at the present displacement, at rest; collective."""
+        for term in self.terms:
+            term.begin_at(self.u)
 
     def commit(self) -> None:
         """Accept the present displacement."""

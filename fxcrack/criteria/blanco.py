@@ -74,8 +74,7 @@ class Blanco:
                 f"{phi[m.argmin()]:g}; growth must rise with the load at every mode mix"
             )
 
-    @property
-    def life_exponent(self) -> float:
+    def life_exponent(self, toughness: float) -> float:
         """Largest exponent of growth over all mode mixes."""
         return float(self.constants(np.linspace(0.0, 1.0, 101))[1].max())
 

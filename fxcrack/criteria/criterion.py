@@ -81,9 +81,12 @@ class Criterion(Protocol):
         """
         return False
 
-    @property
-    def life_exponent(self) -> float:
-        """Power of the range of G with which a crack grows per cycle; 0 outside cycles."""
+    def life_exponent(self, toughness: float) -> float:
+        """Power of the range of G with which a crack grows per cycle; 0 outside cycles.
+
+        Args:
+            toughness: Mode I toughness [force/length], for laws that are no powers.
+        """
         return 0.0
 
     @property

@@ -135,8 +135,8 @@ class RateCriterion(Criterion):
 
     @property
     def needs_exact_S(self) -> bool:
-        """Exact crack closure releases units in the present state."""
-        return self.method == "closure"
+        """Exact crack closure and the domain integral release units in the present state."""
+        return self.method in ("closure", "domain")
 
     @property
     def needs_wake_openings(self) -> bool:
@@ -349,7 +349,7 @@ class RateEvaluator(SofteningEvaluator):
         if self._moving and self._temperature is not None:
             columns.append(self._temperature(time)[tips.node, None])
         if self._domain is not None:
-            columns.append(self._domain.measure(tips, state))
+            columns.append(self._domain.measure(tips, state, force))
         return np.concatenate(columns, 1)
 
     @property

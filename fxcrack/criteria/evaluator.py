@@ -113,6 +113,8 @@ class SofteningEvaluator(Evaluator, Protocol):
 
 _AT_ONE = 4e-15
 """How near to 1 a power of f is at a crossing."""
+_NARROWINGS = 24
+"""Times an interval of 8 parts is divided in 4: a dip of 1e-14 of a piece is found."""
 _ROUND_OFF = 1e-13
 """Differences below this fraction of the largest value do not make a path bend."""
 
@@ -189,6 +191,8 @@ def first_crossing(
 
     grid = np.linspace(0.0, 1.0, 9)
     values = excess(grid)
+    if not upward and not (values <= 0.0).any():
+        grid, values = _around_least(excess, grid, values)
     passed = values >= 0.0 if upward else values <= 0.0
     if not passed.any():
         return None
@@ -200,6 +204,34 @@ def first_crossing(
         *map(float, (grid[k - 1], grid[k], values[k - 1], values[k])),
         close=_AT_ONE,
     )
+
+
+def _around_least(
+    excess: Callable[[Array], Array], grid: Array, values: Array
+) -> tuple[Array, Array]:
+    """Values nearer to where a function that falls and rises again is least, until one is <= 0.
+
+    Beside constant loads f falls as the proportional load goes back, and rises again where that
+    load acts the other way round: it may be below 1 between two places at which it is above.
+
+    Args:
+        excess: The function of places, shape (m,) to (m,).
+        grid: Places, increasing, shape (n,).
+        values: Its values there, all positive, shape (n,).
+
+    Returns:
+        Places that begin and end as those given do, and the values there.
+    """
+    first, last = (grid[0], values[0]), (grid[-1], values[-1])
+    for _ in range(_NARROWINGS):
+        k = int(np.argmin(values))
+        low, high = grid[max(k - 1, 0)], grid[min(k + 1, len(grid) - 1)]
+        grid = np.linspace(low, high, 9)
+        values = excess(grid)
+        if (values <= 0.0).any() or high - low <= _ROUND_OFF * high:
+            break
+    places = np.concatenate([[first[0]], grid, [last[0]]])
+    return places, np.concatenate([[first[1]], values, [last[1]]])
 
 
 class TipEvaluator(Evaluator):

@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Pressure, Traction
 from fxcrack.criteria.crack_tip_fields import TipFields
-from fxcrack.criteria.front_cells import FrontCells
-from fxcrack.criteria.virtual_extension import Corners
+from fxcrack.interface.crack_pressure import CrackPressure
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import FacetSurface, gather_surface, shape_functions
 
 
@@ -33,7 +34,17 @@ class LoadedFaces:
 
 
 def loads_on_faces(continuum: Continuum, loads: list[Any]) -> list[LoadedFaces]:
-    """The tractions and pressures among some loads, with their facets; collective."""
+    """The tractions and pressures among some loads, with their facets; collective.
+
+    Raises:
+        InputError: One of them is a pressure that follows the crack.
+    """
+    for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"method='domain' does not know pressures that follow the crack (pressure "
+                f"'{load.title}'); use method='vcct' or 'closure'"
+            )
     return [
         LoadedFaces(k, load, gather_surface(continuum, load.where))
         for k, load in enumerate(loads)
@@ -53,7 +64,8 @@ class _Facets:
         force: Traction times area at the points, shape (n, n_points, gdim).
         x: The points, shape (n, n_points, 3).
         shift: Extension at the points, shape (n, n_points, 3).
-        normal: Outward normals, likewise.
+        above: Whether the cell of each is on the side the normal of the interface points to, shape
+            (n,).
     """
 
     number: int
@@ -62,7 +74,7 @@ class _Facets:
     force: Array
     x: Array
     shift: Array
-    normal: Array
+    above: Bools
 
 
 class FaceTractions:
@@ -70,9 +82,9 @@ class FaceTractions:
 
     Args:
         loaded: All loaded faces of the scene.
-        corners: Corners around the front.
         q: Extension at the corners of the ring's cells, shape (n_cells, n_corners, gdim).
         cells: These.
+        above: Whether each of them is on the side the normal points to, shape (n_cells,).
         nodes: Global displacement nodes of the ring, sorted, shape (n_nodes,).
         n_loads: Number of load factors.
         gdim: Components of a displacement.
@@ -81,9 +93,9 @@ class FaceTractions:
     def __init__(
         self,
         loaded: list[LoadedFaces],
-        corners: Corners,
         q: Array,
         cells: FrontCells,
+        above: Bools,
         nodes: Ints,
         n_loads: int,
         *,
@@ -93,6 +105,7 @@ class FaceTractions:
         shift = np.zeros((len(nodes), 3))
         ids = np.searchsorted(nodes, cells.nodes[:, : cells.n_corners])
         shift[ids.ravel(), :gdim] = q.reshape(-1, gdim)
+        self._above = _sides(cells, above)
         self._facets = [f for f in (self._find(x, nodes, shift) for x in loaded) if f is not None]
 
     def _find(self, faces: LoadedFaces, nodes: Ints, shift: Array) -> _Facets | None:
@@ -107,22 +120,15 @@ class FaceTractions:
         rows = np.flatnonzero(moves[corner].any(axis=1) & inside[s.facets].all(axis=1))
         if not len(rows):
             return None
-        points, weights = edge_quadrature(s.kind)
-        values, slopes = shape_functions(s.kind, s.order, points)
-        linear, _ = shape_functions(s.kind, 1, points)
-        facets = s.facets[rows]
-        x = np.einsum("qa,fac->fqc", values, s.x[facets])
-        tangents = np.einsum("dqa,fac->fqdc", slopes, s.x[facets])
-        q = np.einsum("qa,fac->fqc", linear, of_node[corner[rows]])
-        gram = np.einsum("fqdc,fqec->fqde", tangents, tangents)
-        share = np.linalg.solve(gram, np.einsum("fqdc,fqc->fqd", tangents, q)[..., None])[..., 0]
-        along = np.einsum("fqd,dqa->fqa", share, slopes)
-        normals, size = s.facet_normals(points)
-        normals, size = normals[rows], size[rows]
-        breadth = np.einsum("qa,fa->fq", values, s.breadth[facets])
-        traction = _traction(faces.load, x, normals)
-        force = traction * (size * breadth * weights)[..., None]
-        return _Facets(faces.number, at[facets], along, force[..., : self._gdim], x, q, normals)
+        at_points = _moved(s, rows, of_node)
+        traction = _traction(faces.load, at_points.x, at_points.normals)
+        force = traction * at_points.size[..., None]
+        # a facet that moves belongs to a cell of the ring, whose side of the interface is its own
+        above = [self._above[tuple(sorted(k))] for k in s.dofs[corner[rows]].tolist()]
+        return _Facets(
+            faces.number, at[s.facets[rows]], at_points.along, force[..., : self._gdim],
+            at_points.x, at_points.q, np.array(above),
+        )  # fmt: skip
 
     def work(self, u: Array, load: Array) -> float:
         """The term in a state.
@@ -147,16 +153,114 @@ class FaceTractions:
         """
         out = np.zeros((n_modes, self._n_loads))
         for f in self._facets:
-            # the outward normal of the side the interface normal points to is opposite to it
-            side = np.einsum("fqc,c->fq", f.normal, fields.axes[1]).mean(axis=1) > 0.0
-            for number, rows in enumerate((~side, side)):
+            for side, rows in enumerate((f.above, ~f.above)):
                 if not rows.any():
                     continue
                 x = (f.x[rows] - origin).reshape(-1, 3)
-                found = fields.gradients(x, number)[:n_modes]
+                found = fields.gradients(x, side)[:n_modes]
                 tip = found.reshape(n_modes, int(rows.sum()), -1, 3, 3)[..., : self._gdim, :]
                 out[:, f.number] += np.einsum("fqc,mfqcj,fqj->m", f.force[rows], tip, f.shift[rows])
         return out
+
+
+@dataclass(frozen=True)
+class OpenedFacets:
+    """The derivative of a jump along the extension, integrated over some slave facets.
+
+    Attributes:
+        nodes: Slave nodes, shape (n,).
+        weights: Of their jumps, shape (n,) [length].
+    """
+
+    nodes: Ints
+    weights: Array
+
+
+def opened_facets(
+    surface: FacetSurface, bonded: Bools, opened: Ints, nodes: Ints, cells: FrontCells, q: Array
+) -> OpenedFacets:
+    """Facets of the slave face that nodes which have just been released have opened.
+
+    Args:
+        surface: The slave face.
+        bonded: Its bonded nodes, shape (n_surface_nodes,).
+        opened: The released nodes, shape (n,).
+        nodes: Global displacement nodes of the ring, sorted, shape (n_nodes,).
+        cells: Cells of the ring.
+        q: Extension at their corners, shape (n_cells, n_corners, gdim).
+    """
+    none = OpenedFacets(np.zeros(0, dtype=np.int64), np.zeros(0))
+    if not len(opened):
+        return none
+    shift = np.zeros((len(nodes), 3))
+    ids = np.searchsorted(nodes, cells.nodes[:, : cells.n_corners])
+    shift[ids.ravel(), : q.shape[2]] = q.reshape(-1, q.shape[2])
+    at = np.searchsorted(nodes, surface.dofs)
+    at = np.where(at < len(nodes), at, 0)
+    of_node = np.where((nodes[at] == surface.dofs)[:, None], shift[at], 0.0)
+    corner = surface.facets[:, : surface.n_corners]
+    mine = np.isin(surface.facets, opened)
+    # those behind the front hold nodes that were open before
+    fresh = mine.any(axis=1) & (mine | bonded[surface.facets]).all(axis=1)
+    moves = (np.abs(of_node).max(axis=1) > 0.0)[corner].any(axis=1)
+    rows = np.flatnonzero(fresh & moves)
+    if not len(rows):
+        return none
+    at_points = _moved(surface, rows, of_node)
+    each = np.einsum("fqa,fq->fa", at_points.along, at_points.size)
+    found = np.zeros(surface.n_nodes)
+    np.add.at(found, surface.facets[rows], each)
+    chosen = np.unique(surface.facets[rows])
+    return OpenedFacets(chosen, found[chosen])
+
+
+@dataclass(frozen=True)
+class _Moved:
+    """Facets that the extension moves, at quadrature points.
+
+    Attributes:
+        x: The points, shape (n, n_points, 3) [length].
+        q: Extension, likewise.
+        along: Derivative of each shape function along it, times its size, shape (n, n_points,
+            n_nodes).
+        normals: Outward normals, shape (n, n_points, 3).
+        size: Area that each point stands for, shape (n, n_points) [length^2].
+    """
+
+    x: Array
+    q: Array
+    along: Array
+    normals: Array
+    size: Array
+
+
+def _moved(s: FacetSurface, rows: Ints, of_node: Array) -> _Moved:
+    """Facets of a surface with the extension given at its nodes, shape (n_surface_nodes, 3)."""
+    points, weights = edge_quadrature(s.kind)
+    values, slopes = shape_functions(s.kind, s.order, points)
+    linear, _ = shape_functions(s.kind, 1, points)
+    facets, corner = s.facets[rows], s.facets[rows, : s.n_corners]
+    tangents = np.einsum("dqa,fac->fqdc", slopes, s.x[facets])
+    q = np.einsum("qa,fac->fqc", linear, of_node[corner])
+    gram = np.einsum("fqdc,fqec->fqde", tangents, tangents)
+    share = np.linalg.solve(gram, np.einsum("fqdc,fqc->fqd", tangents, q)[..., None])[..., 0]
+    normals, size = s.facet_normals(points)
+    breadth = np.einsum("qa,fa->fq", values, s.breadth[facets])
+    return _Moved(
+        np.einsum("qa,fac->fqc", values, s.x[facets]),
+        q,
+        np.einsum("fqd,dqa->fqa", share, slopes),
+        normals[rows],
+        size[rows] * breadth * weights,
+    )
+
+
+def _sides(cells: FrontCells, above: Bools) -> dict[tuple[int, ...], bool]:
+    """The side of the cell behind each boundary facet of some cells, by its sorted corner nodes."""
+    corners = np.sort(cells.nodes[:, cells.facet_corners], axis=2)
+    row, facet = np.nonzero(cells.outer)
+    keys = corners[row, facet].tolist()
+    return {tuple(k): bool(v) for k, v in zip(keys, above[row], strict=True)}
 
 
 @lru_cache(maxsize=4)

@@ -52,10 +52,9 @@ class Fatigue(RateCriterion):
 
     grows_in_cycles: ClassVar[bool] = True
 
-    @property
-    def life_exponent(self) -> float:
+    def life_exponent(self, toughness: float) -> float:
         """Exponent of growth."""
-        return self.growth_law.life_exponent
+        return self.growth_law.life_exponent(toughness)
 
     @property
     def growth_law(self) -> FatigueLaw:

@@ -36,9 +36,13 @@ class Regime(IntEnum):
 class FatigueLaw(Protocol):
     """What every law of fatigue growth can do."""
 
-    @property
-    def life_exponent(self) -> float:
-        """Largest power of G with which growth per cycle rises, for estimates of errors."""
+    def life_exponent(self, toughness: float) -> float:
+        """Largest power of G with which growth per cycle rises, for estimates of errors.
+
+        Args:
+            toughness: Mode I toughness [force/length]: a law that is no power of G is judged
+                below it.
+        """
         ...
 
     def onset(self, cycle: CycleRates) -> Array:

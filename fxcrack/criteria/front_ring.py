@@ -25,11 +25,12 @@ import basix
 import numpy as np
 
 from fxcrack.base.arrays import Array, Bools
-from fxcrack.criteria.crack_tip_fields import VOIGT, TipFields
-from fxcrack.criteria.front_cells import FrontCells
+from fxcrack.criteria.cell_laws import voigt_strain
+from fxcrack.criteria.crack_tip_fields import TipFields
+from fxcrack.interface.front_cells import FrontCells
 
-_DEGREE = 6
-"""Quadrature degree in a ring at least: the fields of a tip are no polynomials."""
+FIELDS_DEGREE = 6
+"""Quadrature degree of the fields of a tip at least: they are no polynomials."""
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def tables(kind: str, order: int, n_geometry: int, degree: int) -> Tables:
         degree: Quadrature degree.
     """
     cell = getattr(basix.CellType, kind)
-    points, weights = basix.make_quadrature(cell, max(degree, _DEGREE))
+    points, weights = basix.make_quadrature(cell, degree)
 
     def lagrange(n: int) -> basix.finite_element.FiniteElement:
         family, variant = basix.ElementFamily.P, basix.LagrangeVariant.equispaced
@@ -80,22 +81,6 @@ def tables(kind: str, order: int, n_geometry: int, degree: int) -> Tables:
         values(degree_of_geometry),
         values(1),
     )
-
-
-def voigt_strain(gradient: Array) -> Array:
-    """Voigt strain (engineering shears) of displacement gradients, (..., 3, 3) to (..., 6)."""
-    h = gradient
-    pairs = [h[..., i, i] for i in range(3)]
-    pairs += [h[..., i, j] + h[..., j, i] for i, j in VOIGT[3:]]
-    return np.stack(pairs, axis=-1)
-
-
-def tensor_of_stress(stress: Array) -> Array:
-    """Tensor of a Voigt stress, shape (..., 6) to (..., 3, 3)."""
-    out = np.empty((*stress.shape[:-1], 3, 3))
-    for k, (i, j) in enumerate(VOIGT):
-        out[..., i, j] = out[..., j, i] = stress[..., k]
-    return out
 
 
 class CellGeometry:
@@ -148,10 +133,28 @@ class CellGeometry:
         slope = self._physical(table) if corners else self._derivative
         out = np.zeros((*self.weight.shape, 3, 3))
         g = self.gdim
-        out[..., :g, :g] = np.einsum("cai,cqaj->cqij", values, slope)
+        # products of small matrices: einsum takes several times as long
+        out[..., :g, :g] = np.swapaxes(values, 1, 2)[:, None] @ slope
         if self.ring:
             out[..., 2, 2] = np.einsum("qa,ca->cq", table[0], values[..., 0]) / self.radius
         return out
+
+    def weights_at_nodes(self, weights: Array) -> Array:
+        """Weights of the displacements from those of their gradient.
+
+        Args:
+            weights: Shape (n, n_cells, n_points, 3, 3).
+
+        Returns:
+            Shape (n, n_cells, n_nodes, gdim): the sum over points and components of the weights
+            times :meth:`gradient` is the sum of these times the displacements.
+        """
+        g = self.gdim
+        out = (self._derivative @ np.swapaxes(weights[..., :g, :g], -1, -2)).sum(axis=2)
+        if self.ring:
+            table = self.tables.displacement[0]
+            out[..., 0] += (weights[..., 2, 2] / self.radius) @ table
+        return np.asarray(out)
 
     def slope(self, values: Array) -> Array:
         """Gradient of a scalar given at the displacement nodes, shape (..., n_cells, n_points, 3).
@@ -270,6 +273,4 @@ __all__ = [
     "TipState",
     "divergence_in_rings",
     "on_both_sides",
-    "tensor_of_stress",
-    "voigt_strain",
 ]

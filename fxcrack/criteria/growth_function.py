@@ -50,14 +50,17 @@ class GrowthFunction:
     def _name(self) -> str:
         return str(getattr(self.function, "__name__", self.function))
 
-    @property
-    def life_exponent(self) -> float:
-        """How growth rises with G in mode I at G = G_c/2 and R = 0, at least 1."""
-        g = 0.5 * np.array([1.0, 1.01])
-        rate = self.growth(CycleRates(g, g, np.ones(2)))
-        if not np.all(rate > 0.0):
-            return 1.0
-        return max(float(np.log(rate[1] / rate[0]) / np.log(1.01)), 1.0)
+    def life_exponent(self, toughness: float) -> float:
+        """Steepest rise of growth with G in mode I between G_c/10 and G_c at R = 0, at least 1.
+
+        Args:
+            toughness: G_c [force/length].
+        """
+        g = toughness * np.geomspace(0.1, 1.0, _LEVELS)
+        rate = self.growth(CycleRates(g, g, np.full_like(g, toughness)))
+        grows = (rate[1:] > 0.0) & (rate[:-1] > 0.0)
+        slopes = np.diff(np.log(np.where(rate > 0.0, rate, 1.0))) / np.diff(np.log(g))
+        return float(slopes[grows].max(initial=1.0))
 
     def onset(self, cycle: CycleRates) -> Array:
         """Zero, shape (n,)."""
@@ -99,6 +102,10 @@ class GrowthFunction:
         """Regime of each front node, shape (n,)."""
         grows = np.where(self.growth(cycle) > 0.0, int(Regime.PARIS), int(Regime.NONE))
         return np.where(cycle.G_max >= cycle.G_c, int(Regime.UNSTABLE), grows)
+
+
+_LEVELS = 25
+"""Levels of G at which the rise of a function of the user is looked at."""
 
 
 def fatigue_law_of(owner: str, law: FatigueLaw | UserFunction) -> FatigueLaw:

@@ -15,8 +15,8 @@ from fxcrack.base.arrays import Array
 from fxcrack.base.checks import format_point, number
 from fxcrack.base.errors import InputError
 from fxcrack.base.positions import numbers_at
+from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.loads import AmplitudeLike
 from fxcrack.criteria.probe import FrontProbe
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair

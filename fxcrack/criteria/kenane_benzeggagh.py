@@ -65,8 +65,7 @@ class KenaneBenzeggagh:
         keep(self, normalised=flag("KenaneBenzeggagh", "normalised", self.normalised))
         keep_onset_and_limits(self)
 
-    @property
-    def life_exponent(self) -> float:
+    def life_exponent(self, toughness: float) -> float:
         """Largest exponent of growth over all mode mixes."""
         return max(self.m_I, self.m_II)
 

@@ -61,7 +61,8 @@ class Ligaments:
             Whether closing the crack takes work there, shape (m,); the others keep their bonds.
         """
         work = force * opening
-        normal, along = work[:, 0], work[:, 1:].sum(axis=1)
+        # modes that would take up energy count no more than in the rates of the criterion
+        normal, along = work[:, 0], np.maximum(work[:, 1:], 0.0).sum(axis=1)
         whole = np.maximum(normal, 0.0) + np.maximum(along, 0.0)
         with np.errstate(divide="ignore", invalid="ignore"):
             k = np.stack(

@@ -14,10 +14,11 @@ import basix
 import numpy as np
 
 from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.criteria.cell_laws import tensor_of_stress, voigt_strain
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import edge_quadrature
-from fxcrack.criteria.front_cells import FrontCells
-from fxcrack.criteria.front_ring import CellGeometry, tensor_of_stress, voigt_strain
+from fxcrack.criteria.front_ring import CellGeometry
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import closure_table, shape_functions
 
 
@@ -61,7 +62,7 @@ def outer_faces(
     points, weights = edge_quadrature(kind)
     values, slopes = shape_functions(kind, cells.order, points)
     linear, _ = shape_functions(kind, 1, points)
-    x_nodes = _node_positions(cells)
+    x_nodes = node_positions(cells)
     centre = np.zeros((len(cells.nodes), 3))
     centre[:, :gdim] = cells.corners.mean(axis=1)
     for facet in np.flatnonzero(chosen.any(axis=0)):
@@ -98,7 +99,7 @@ def outer_faces(
     return out
 
 
-def _node_positions(cells: FrontCells) -> Array:
+def node_positions(cells: FrontCells) -> Array:
     """Positions of the displacement nodes, shape (n_cells, n_nodes, 3) [length]."""
     family, variant = basix.ElementFamily.P, basix.LagrangeVariant.equispaced
     n = next(

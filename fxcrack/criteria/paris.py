@@ -54,8 +54,7 @@ class Paris:
         check_drive("Paris", self.drive)
         keep(self, normalised=flag("Paris", "normalised", self.normalised))
 
-    @property
-    def life_exponent(self) -> float:
+    def life_exponent(self, toughness: float) -> float:
         """Exponent of growth."""
         return self.c4
 

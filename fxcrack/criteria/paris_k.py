@@ -73,8 +73,7 @@ class ParisK:
         check_drive("ParisK", self.drive)
         keep_onset_and_limits(self)
 
-    @property
-    def life_exponent(self) -> float:
+    def life_exponent(self, toughness: float) -> float:
         """Exponent of growth with G, half of that with K."""
         return 0.5 * self.m
 

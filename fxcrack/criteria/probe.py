@@ -11,15 +11,46 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.criteria.crack_closure import opens
 from fxcrack.interface.front import Front
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.tips import Tips
 
 State = Any
 """A state of the solver, e.g. an equilibrium; criteria pass it to the probe and read nothing."""
+
+
+class CellsAround(Protocol):
+    """The cells of the bodies, of which those near some positions can be had on every rank."""
+
+    def sizes(self, nodes: list[Ints], x: Array, along: Array) -> Array:
+        """How far the cells at some nodes reach from a position; collective.
+
+        Args:
+            nodes: Global displacement nodes, per position those that lie there.
+            x: Positions, shape (n, gdim) [length].
+            along: Unit vectors of the front, along which nothing is measured, shape (n, gdim).
+
+        Returns:
+            Shape (n,) [length].
+        """
+        ...
+
+    def near(self, x: Array, radius: Array) -> FrontCells:
+        """Cells that reach into spheres around some positions, the same on every rank; collective.
+
+        Args:
+            x: Positions, shape (n, gdim) [length].
+            radius: Radii, shape (n,) [length].
+        """
+        ...
+
+    def temperature_table(self, points: Array) -> Array:
+        """Values of the temperature's element at reference points, shape (n_points, n_values)."""
+        ...
 
 
 class Bodies(Protocol):
@@ -38,12 +69,35 @@ class Bodies(Protocol):
     finite: bool
     uncovered: str
 
+    def cells_around(self, groups: list[str | None]) -> CellsAround:
+        """The cells; collective.
+
+        Args:
+            groups: Cell groups whose cells are marked; ``None`` stands for the whole mesh.
+        """
+        ...
+
     def displacements(self, nodes: Ints, state: State) -> Array:
         """Displacements of global nodes, the same on all ranks; collective.
 
         Args:
             nodes: Global displacement nodes, sorted, shape (n,).
             state: State of the solver.
+
+        Returns:
+            Shape (n, gdim) [length].
+        """
+        ...
+
+    def changes(self, nodes: Ints, before: State, after: State) -> Array:
+        """Change of displacements between two states of the same loads; collective.
+
+        Of bodies that are not linear by their tangent.
+
+        Args:
+            nodes: Global displacement nodes, sorted, shape (n,).
+            before: State of the solver.
+            after: Another one, from :meth:`FrontProbe.opened`.
 
         Returns:
             Shape (n, gdim) [length].
@@ -136,6 +190,21 @@ class FrontProbe(Protocol):
         """
         ...
 
+    def opened(self, nodes: Ints, closed: Bools, force: Array, state: State) -> State:
+        """The state that releasing bonded nodes would lead to, everything else as it is.
+
+        Loads and contact are those of the given state. A state near the last one, of whose bodies
+        only the displacements are asked for.
+
+        Args:
+            nodes: Bonded slave nodes, shape (k,).
+            closed: Whether their normal jump stays zero, shape (k,).
+            force: Forces that their bonds hold, global vectors, tension positive, shape (k, 3)
+                [force].
+            state: State of the solver.
+        """
+        ...
+
     def mean_position(self, group: str) -> Array:
         """Mean position of the nodes of a group in the undeformed body, shape (3,); collective.
 
@@ -180,6 +249,13 @@ def bond_forces(probe: FrontProbe, tips: Tips, state: State) -> Array:
     return np.asarray(out)
 
 
+def load_density(probe: FrontProbe, tips: Tips, state: State) -> Array:
+    """Load per area on the faces behind tips, as it acts on the slave side, shape (n_tips, 3)."""
+    areas = probe.pair.surface.areas
+    wake = probe.face_loads(tips.wake_nodes, state).sum(axis=(1, 2))
+    return np.asarray(wake / areas[tips.wake_nodes].sum(axis=(1, 2))[:, None])
+
+
 def _loads_to_come(probe: FrontProbe, tips: Tips, state: State) -> Array:
     """Load on the faces the crack is about to open, if that of the wake continues there.
 
@@ -191,8 +267,7 @@ def _loads_to_come(probe: FrontProbe, tips: Tips, state: State) -> Array:
         Global vectors per force node, shape (n, k, 3).
     """
     areas = probe.pair.surface.areas
-    wake = probe.face_loads(tips.wake_nodes, state).sum(axis=(1, 2))
-    density = wake / areas[tips.wake_nodes].sum(axis=(1, 2))[:, None]
+    density = load_density(probe, tips, state)
     whole = areas[tips.force_nodes][..., None] * density[:, None]
     to_come = whole - probe.face_loads(tips.force_nodes, state)
     to_come[~np.any(density, axis=1)] = 0.0

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.criteria.front_cells import FrontCells
 from fxcrack.interface.front import Front
+from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.tips import Tips
 
 _ALONG = 0.5
@@ -34,11 +34,13 @@ class FrontLine:
         segments: Tips at both ends of each segment, twice the same for a point, shape
             (n_segments, 2).
         members: Corner tips that stand for each tip: itself, or those beside a midside node.
+        dim: Dimension of the interface, 1 or 2.
     """
 
     x: Array
     segments: Ints
     members: list[Ints]
+    dim: int
 
     @classmethod
     def of(cls, front: Front, tips: Tips) -> FrontLine:
@@ -67,19 +69,20 @@ class FrontLine:
             away = np.linalg.norm(x[corners] - x[tip], axis=1)
             near = np.flatnonzero(corners)[np.argsort(away, kind="stable")[:2]]
             members.append(np.sort(near))
-        return cls(x, found, members)
+        return cls(x, found, members, surface.dim)
 
     def widths(self, tips: Tips, i: int) -> float:
         """Area that the extension of a tip opens per length, in the direction it grows [length].
 
-        In 2-D 1: what is out of the plane is not counted.
+        In 2-D what is out of the plane is not counted: 1. A tip of a surface without others beside
+        it opens the width that belongs to it.
         """
         total = 0.0
         normal, growth = tips.frame[i, :, 0], tips.frame[i, :, 1]
         for member in self.members[i]:
             for a, b in self.segments[(self.segments == member).any(axis=1)]:
                 if a == b:
-                    total += 1.0
+                    total += 1.0 if self.dim == 1 else float(tips.width[i])
                 else:
                     chord = self.x[b] - self.x[a]
                     total += 0.5 * abs(float(np.cross(normal, chord) @ growth))

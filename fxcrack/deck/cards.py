@@ -140,6 +140,7 @@ class Card:
         places: File and line of each data line, in runs (file, lines).
         file: File of the keyword.
         line: Its line, from 1.
+        home: Key of the instance in whose part it stands, empty outside of parts.
     """
 
     keyword: str
@@ -149,6 +150,7 @@ class Card:
     line: int
     lines: list[str] = field(default_factory=list)
     places: list[tuple[str, Sequence[int]]] = field(default_factory=list)
+    home: str = ""
 
     @property
     def place(self) -> str:

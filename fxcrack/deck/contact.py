@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Ints
@@ -29,8 +30,14 @@ from fxcrack.deck.groups import Groups
 from fxcrack.deck.interactions import friction, interaction, note_thickness
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
+from fxcrack.deck.supports import Boundary
 from fxcrack.interface.pairing import Interface
 from fxcrack.steps.debond import Debond
+
+_RAMP = 5
+"""Increments over which a ramp falls that cannot fall with the opening."""
+_COINCIDENT = 1e-6
+"""Distance of nodes at one place, over the size of the facets."""
 
 
 @dataclass(eq=False)
@@ -206,6 +213,53 @@ class Contacts:
             grow[found[0].title] = max(int(card.number("FREQUENCY", 1.0)), 0)
         return grow
 
+    # -- supports of bonded nodes --------------------------------------------------------
+
+    def share_supports(self, boundary: Boundary) -> None:
+        """Let supports of bonded slave nodes hold the master nodes at the same places as well.
+
+        A bond makes them one as long as it holds, and the deck may name either.
+
+        Args:
+            boundary: What is prescribed; changed in place.
+        """
+        for pair in self.pairs:
+            card = pair.row.card
+            if pair.bonded is None and not card.has("TIED"):
+                continue
+            slave = self._slave_nodes(pair)
+            name = "" if pair.bonded is None else label(pair.bonded.text(2))
+            if name and pair.bonded is not None:
+                bonded = self._flat.nodes(pair.bonded.card, name, pair.bonded.index)
+                slave = slave[np.isin(slave, self._flat.with_centres(bonded))]
+            self._share(boundary, card, pair.title, slave, (pair.master, pair.row.index))
+        for card in self._ties:
+            for row in card.rows():
+                slave = np.unique(self._flat.surface(card, row.text(0), row.index))
+                self._share(boundary, card, row.text(0), slave, (row.text(1), row.index))
+
+    def _share(
+        self, boundary: Boundary, card: Card, title: str, slave: Ints, of_master: tuple[str, int]
+    ) -> None:
+        held = slave[(boundary.owner[:, :, slave] >= 0).any(axis=(0, 1))]
+        if not len(held):
+            return
+        rows = self._flat.surface(card, *of_master)
+        x = self._flat.points
+        master = np.setdiff1d(np.unique(rows), slave)
+        if not len(master):
+            return
+        size = float(np.linalg.norm(np.ptp(x[rows], axis=1), axis=1).mean())
+        distance, found = cKDTree(x[master]).query(x[held])
+        near = distance <= _COINCIDENT * size
+        changed = boundary.share(held[near], master[found[near]])
+        if changed:
+            self._report.replace(
+                f"the supports of {changed} bonded nodes of '{title}' hold the nodes of the master "
+                "surface at the same places as well",
+                card,
+            )
+
     # -- the scene -----------------------------------------------------------------------
 
     def build(
@@ -226,7 +280,8 @@ class Contacts:
             if not pair.debonds:
                 bonds.append(pair.interface)
                 continue
-            debonds.append(self._debond(pair))
+            rubs = any(self._friction(p, interactions) is not None for p in self.pairs)
+            debonds.append(self._debond(pair, rubs=rubs))
             held = np.intersect1d(self._slave_nodes(pair), supported)
             if len(held):
                 log.warn(
@@ -301,6 +356,7 @@ class Contacts:
             contact=not card.has("TIED"),
             friction=friction,
             normal_only=pair.normal_only,
+            pairing=_pairing(card),
             gap=gap,
             name=pair.title,
         )
@@ -338,7 +394,7 @@ class Contacts:
         note_thickness(family, self._flat, self._report)
         return friction(family)
 
-    def _debond(self, pair: PairDef) -> Debond:
+    def _debond(self, pair: PairDef, *, rubs: bool) -> Debond:
         assert pair.interface is not None
         _, card, criterion_card = pair.debonds[0]
         for _, other, of_other in pair.debonds[1:]:
@@ -365,6 +421,12 @@ class Contacts:
         if pair.normal_only and isinstance(criterion, RateCriterion):
             criterion_card.fail("a bond in the NORMAL direction only is not possible with it")
         release = _release(card, criterion)
+        if rubs and isinstance(release, RampRelease):
+            release = RampRelease(increments=_RAMP)
+            self._report.replace(
+                f"DEBONDING FORCE=RAMP beside *FRICTION: the force falls over {_RAMP} increments",
+                card,
+            )
         try:
             return Debond(pair.interface, criterion, release)
         except InputError as error:
@@ -382,8 +444,15 @@ class Contacts:
             groups.surface(card, master, row.index),
             bonded=Everywhere(True),
             tolerance=tolerance,
+            pairing=None if self._explicit else _pairing(card),
             name=card.text("NAME", default=slave),
         )
+
+
+def _pairing(card: Card) -> str | None:
+    """How nodes follow the master where the deck says so."""
+    kinds = {"NODETOSURFACE": "node-to-surface", "SURFACETOSURFACE": "surface-to-surface"}
+    return kinds[card.word("TYPE")] if card.has("TYPE") else None
 
 
 def _release_words(card: Card) -> tuple[object, ...]:

@@ -55,7 +55,9 @@ class Deck:
             InputError: An interface that is to grow is not part of the scene any more.
         """
         for step in self.steps:
-            self.run_step(step, **options)
+            history = self.run_step(step, **options)
+            if stopped(history):
+                break
         return self.scene.history
 
     def run_step(self, step: DeckStep, **options: Any) -> History:
@@ -68,6 +70,22 @@ class Deck:
                     "of the step's grow"
                 )
         return self.scene.run(step.step, grow=[by_title[n] for n in step.grow], **options)
+
+
+def stopped(history: History) -> bool:
+    """Whether the last step ended before its time: the steps after it have no state to begin with.
+
+    It is said with what would help in the words of a deck.
+    """
+    if not history.reason.startswith("stopped"):
+        return False
+    log.warn(
+        "the analysis ends with this step; in a deck, UNSTABLE GROWTH TOLERANCE or a larger "
+        "TOLERANCE of *FRACTURE CRITERION lets several nodes debond in one increment, *CONTROLS, "
+        "PARAMETERS=TIME INCREMENTATION (eighth field, I_A) allows more cutbacks, and INC of *STEP "
+        "more increments"
+    )
+    return True
 
 
 def read_deck(

@@ -9,14 +9,19 @@ the weighted mean motion of the surface.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.continuum.couplings import MOTIONS, Coupling
+from fxcrack.continuum.loads import AmplitudeLike, Ramp
 from fxcrack.deck.cards import Card, Row
 from fxcrack.deck.flat import Flat
+from fxcrack.deck.groups import Groups
+from fxcrack.deck.supports import AnySupport, Boundary
+from fxcrack.deck.thermal import NodalField
 
 _LINE = 1e-10
 
@@ -101,7 +106,7 @@ def distributing(coupling: Card, card: Card, reference: int, flat: Flat) -> Dist
     if flat.kind.model == "axisymmetric":
         card.fail("it is not available in axisymmetric models; load the surface by *DSLOAD")
     name = coupling.text("SURFACE")
-    nodes = flat.surface_nodes(coupling, name)
+    nodes = influenced(coupling, flat, reference, flat.surface_nodes(coupling, name))
     nodes = nodes[(nodes != reference) & flat.used[nodes] & (nodes < flat.n_given)]
     if not len(nodes):
         coupling.fail(f"no element has a node of surface '{name}'; couple a surface of the body")
@@ -109,8 +114,28 @@ def distributing(coupling: Card, card: Card, reference: int, flat: Flat) -> Dist
     x = flat.points[nodes]
     centre = weights @ x
     title = coupling.text("CONSTRAINT NAME", default=name)
+    title = f"{coupling.home}.{title}" if coupling.home else title
     lever = flat.points[reference] - centre
     return Distributing(coupling, title, reference, nodes, weights, x - centre, lever)
+
+
+def influenced(coupling: Card, flat: Flat, reference: int, nodes: Ints) -> Ints:
+    """Nodes of a coupling's surface within INFLUENCE RADIUS of its reference, all without.
+
+    Raises:
+        DeckError: There is none.
+    """
+    if not coupling.has("INFLUENCE RADIUS"):
+        return nodes
+    radius = coupling.number("INFLUENCE RADIUS", 0.0)
+    away = np.linalg.norm(flat.points[nodes] - flat.points[reference], axis=1)
+    near: Ints = nodes[away <= radius]
+    if not len(near):
+        coupling.fail(
+            f"no node of the surface lies within INFLUENCE RADIUS={radius:g} of the reference, the "
+            f"nearest is {away.min(initial=np.inf):.4g} away"
+        )
+    return near
 
 
 def _areas(flat: Flat, card: Card, name: str, nodes: Ints) -> Array:
@@ -133,6 +158,49 @@ def _areas(flat: Flat, card: Card, name: str, nodes: Ints) -> Array:
     return np.asarray(share[nodes] / share[nodes].sum())
 
 
+def mean_supports(
+    found: Iterable[Distributing], boundary: Boundary, groups: Groups
+) -> list[AnySupport]:
+    """Prescribed motions of references as those of the weighted mean of their surfaces.
+
+    Args:
+        found: The couplings.
+        boundary: What is prescribed.
+        groups: Takes the groups of their nodes.
+
+    Raises:
+        DeckError: A component is prescribed in some steps only.
+    """
+    out: list[AnySupport] = []
+    flat = boundary.flat
+    gdim = flat.kind.gdim
+    for one in found:
+        by: dict[str, tuple[AmplitudeLike, dict[str, float]]] = {}
+        for dof in (0, 1, 5) if gdim == 2 else range(6):
+            track = boundary.motion(one.reference, dof, one.card, one.name)
+            if track is not None:
+                value, amplitude = (0.0, Ramp()) if track.zero else track.amplitude()
+                by.setdefault(repr(amplitude), (amplitude, {}))[1][MOTIONS[dof]] = value
+        if not by:
+            continue
+        if flat.used[one.reference]:
+            one.card.fail(
+                "the reference node belongs to elements and is prescribed; take a node without "
+                "elements as the reference"
+            )
+        where = groups.nodes(one.name, one.nodes, words="coupling")
+        weight = NodalField(flat.points[one.nodes][:, :gdim], one.weights)
+        point = tuple(flat.points[one.reference][:gdim].tolist())
+        out += [
+            Coupling(
+                where, point, **motions, rotations=False, mean=True, weight=weight,  # type: ignore[arg-type]
+                amplitude=amplitude, name=one.name,
+            )
+            for amplitude, motions in by.values()
+        ]  # fmt: skip
+    return out
+
+
 def by_reference(found: Sequence[Distributing]) -> dict[int, Distributing]:
     """Couplings by their reference nodes.
 
@@ -147,4 +215,4 @@ def by_reference(found: Sequence[Distributing]) -> dict[int, Distributing]:
     return out
 
 
-__all__ = ["Distributing", "by_reference", "distributing"]
+__all__ = ["Distributing", "by_reference", "distributing", "influenced", "mean_supports"]

@@ -9,8 +9,10 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, DeckError, key
-from fxcrack.deck.elements import ElementType, added_nodes, face_nodes, to_dolfinx
+from fxcrack.deck.element_checks import check_nodes, one_kind, repetitions
+from fxcrack.deck.elements import face_nodes, to_dolfinx
 from fxcrack.deck.model import Model
+from fxcrack.deck.raising import raise_order
 from fxcrack.deck.spaces import HOME, NamedSet, Space, SurfaceDef, distinct, existing
 from fxcrack.mesh.raw import row_ids
 
@@ -72,7 +74,7 @@ class Flat:
                 f"part '{part.name}' has no *INSTANCE, so the model has no body; add *ASSEMBLY "
                 "with an *INSTANCE of each part"
             )
-        self.kind = _one_kind(list(spaces.values()))
+        self.kind = one_kind(list(spaces.values()))
         self.placed: dict[str, Placed] = {}
         points, blocks, n_nodes, n_cells = [], [], 0, 0
         for name, space in spaces.items():
@@ -91,7 +93,7 @@ class Flat:
                 blocks.append(at + n_nodes)
                 labels.append(block.table.labels)
                 cells.append(n_cells + np.arange(len(nodes)))
-                _check_nodes(block.card, block.table.labels, nodes)
+                check_nodes(block.card, block.table.labels, nodes)
                 n_cells += len(nodes)
             all_labels = np.concatenate(labels) if labels else np.zeros(0, dtype=np.int64)
             all_cells = np.concatenate(cells) if cells else np.zeros(0, dtype=np.int64)
@@ -117,57 +119,14 @@ class Flat:
                 f"{self.kind.order}, their own"
             )
         if self.kind.serendipity or (order == 2 and self.kind.order == 1):
-            self._raise_order()
+            raised = raise_order(self.kind, self.points, self.cells)
+            self.points, self.cells = raised.points, raised.cells
+            self.parents, self.weights = raised.parents, raised.weights
             self.kind = replace(self.kind, order=2)
         self.used = np.zeros(len(self.points), dtype=bool)
         self.used[self.cells] = True
         self._check_plane()
         self._faces: tuple[Ints, Ints] | None = None
-
-    def _raise_order(self) -> None:
-        """Append the nodes that a whole second-order element lacks, each once."""
-        parents, weights = added_nodes(self.kind)
-        width = max(len(p) for p in parents)
-        self.parents = np.zeros((0, width), dtype=np.int64)
-        self.weights = np.zeros((0, width))
-        numbers = []
-        n, columns = len(self.points), self.cells[:, : self.kind.n_nodes]
-        for local, weight in zip(parents, weights, strict=True):
-            nodes = columns[:, local]
-            if len(local) == self.kind.n_nodes:
-                first = np.arange(len(nodes))
-                inverse = first
-            else:
-                ids = row_ids(np.sort(nodes, axis=1))
-                _, first, inverse = np.unique(ids, return_index=True, return_inverse=True)
-            kept = np.full((len(first), width), -1, dtype=np.int64)
-            kept[:, : len(local)] = nodes[first]
-            scale = np.zeros((len(first), width))
-            scale[:, : len(local)] = weight
-            known = self._known_faces(kept, len(local))
-            new = known < 0
-            number = known.copy()
-            number[new] = n + len(self.parents) + np.arange(int(new.sum()))
-            self.parents = np.concatenate((self.parents, kept[new]))
-            self.weights = np.concatenate((self.weights, scale[new]))
-            numbers.append(number[inverse])
-        added = np.einsum("nk,nkc->nc", self.weights, self.points[np.maximum(self.parents, 0)])
-        self.points = np.concatenate((self.points, added))
-        self.cells = np.column_stack((columns, *numbers))
-
-    def _known_faces(self, nodes: Ints, n: int) -> Ints:
-        """Number of the centre that faces of another local number already have, -1 for none."""
-        out = np.full(len(nodes), -1, dtype=np.int64)
-        if not len(self.parents) or n == self.kind.n_nodes:
-            return out
-        both = np.concatenate((self.parents[:, :n], nodes[:, :n]))
-        ids = row_ids(np.sort(both, axis=1))
-        old, mine = ids[: len(self.parents)], ids[len(self.parents) :]
-        order = np.argsort(old)
-        at = np.minimum(np.searchsorted(old[order], mine), len(old) - 1)
-        found = old[order][at] == mine
-        out[found] = len(self.points) + order[at][found]
-        return out
 
     def _check_plane(self) -> None:
         """Refuse plane elements off the plane z = 0."""
@@ -187,6 +146,9 @@ class Flat:
     def _resolve(self, card: Card, name: str, kind: str, index: int | None) -> tuple[str, NamedSet]:
         """The space and the set that a name means."""
         text, root = key(name), self.model.root
+        own = self.model.instances.get(card.home)
+        if own is not None and text in getattr(own, kind):
+            return card.home, getattr(own, kind)[text]
         if text in getattr(root, kind):
             return "", getattr(root, kind)[text]
         words = text.split(".")
@@ -222,6 +184,7 @@ class Flat:
     def _member(self, card: Card, name: str, index: int | None, kind: str) -> Ints:
         """One node or element, "12" or "inst.12"."""
         first, _, number = key(name).rpartition(".")
+        first = first or card.home
         place = first if first in self.placed else first.rpartition(".")[2]
         if place not in self.placed:
             card.fail(f"there is no instance '{first}'", index)
@@ -246,6 +209,20 @@ class Flat:
             return self._member(card, name, index, "nsets")
         return self._of_set(*self._resolve(card, name, "nsets", index), "nsets")
 
+    def ordered_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
+        """As :meth:`nodes`, in the order of their numbers, or of the deck in UNSORTED sets."""
+        if key(name).rpartition(".")[2].isdigit():
+            return self._member(card, name, index, "nsets")
+        place, found = self._resolve(card, name, "nsets", index)
+        if not found.card.has("UNSORTED"):
+            return self._of_set(place, found, "nsets")
+        parts = []
+        for space_name, labels in found.members.items():
+            placed = self.placed[space_name or place]
+            at = existing(found.card, found.name, labels, placed.space.nodes.find(labels), "nodes")
+            parts.append(at + placed.first_node)
+        return np.concatenate(parts)
+
     def elements(self, card: Card, name: str, index: int | None = None) -> Ints:
         """Cells of an element set, or one element; arguments and error as for :meth:`nodes`."""
         if key(name).rpartition(".")[2].isdigit():
@@ -269,7 +246,7 @@ class Flat:
             n_corners = 2 if self.kind.tdim == 2 else {"tetrahedron": 3}.get(self.kind.cell, 4)
             rows = self.cells[:, table]
             corners = np.sort(rows[:, :, :n_corners].reshape(-1, n_corners), axis=1)
-            self._faces = rows, _repetitions(corners).reshape(len(self.cells), -1)
+            self._faces = rows, repetitions(corners).reshape(len(self.cells), -1)
         return self._faces
 
     def faces(self, card: Card, cells: Ints, face: int, index: int | None = None) -> Ints:
@@ -461,11 +438,13 @@ class Flat:
 
     def with_centres(self, nodes: Ints) -> Ints:
         """Nodes with the added centres whose parents all are among them, ascending."""
+        if not len(self.parents):
+            return distinct(nodes)
         inside = np.zeros(len(self.points) + 1, dtype=bool)
         inside[nodes] = True
         inside[-1] = True  # parent -1: none
-        whole = inside[self.parents].all(axis=1) if len(self.parents) else np.zeros(0, dtype=bool)
-        return np.union1d(nodes, self.n_given + np.flatnonzero(whole))
+        whole = inside[self.parents].all(axis=1)
+        return distinct(np.concatenate((nodes, self.n_given + np.flatnonzero(whole))))
 
     def dolfinx_cells(self) -> Ints:
         """Nodes of the cells in DOLFINx order, shape (n_cells, n_cell_nodes)."""
@@ -475,62 +454,3 @@ class Flat:
         """Values at the deck's nodes extended to the added centres, shape (n_nodes,)."""
         added = (self.weights * values[np.maximum(self.parents, 0)]).sum(axis=1)
         return np.concatenate((values, added))
-
-
-_FACTORS = np.array(
-    [0x9E3779B97F4A7C15, 0xC2B2AE3D27D4EB4F, 0x165667B19E3779F9, 0xD6E8FEB8669FD5B3],
-    dtype=np.uint64,
-)
-"""Odd numbers with bits all over, for a hash of up to four node numbers."""
-
-
-def _repetitions(rows: Ints) -> Ints:
-    """How often each row occurs, shape (n_rows,).
-
-    Args:
-        rows: Each sorted, shape (n_rows, k), k at most 4.
-    """
-    hashes = (rows.astype(np.uint64) * _FACTORS[: rows.shape[1]]).sum(axis=1, dtype=np.uint64)
-    order = np.argsort(hashes)
-    ordered = hashes[order]
-    same = ordered[1:] == ordered[:-1]
-    if not np.array_equal(rows[order[1:][same]], rows[order[:-1][same]]):
-        ids = row_ids(rows)  # two rows with one hash: it may happen once in a million meshes
-        return np.asarray(np.bincount(ids)[ids])
-    number = np.concatenate(([0], np.cumsum(~same)))
-    out = np.empty(len(rows), dtype=np.int64)
-    out[order] = np.bincount(number)[number]
-    return out
-
-
-def _one_kind(spaces: list[Space]) -> ElementType:
-    """The shape, order and kinematic model that all elements share."""
-    blocks = [b for space in spaces for b in space.elements.values() if len(b.table.labels)]
-    if not blocks:
-        raise DeckError("the deck has no elements that fxcrack can compute; add *ELEMENT")
-    first = blocks[0]
-    for block in blocks[1:]:
-        for what, a, b in (
-            ("kinematic models", first.kind.model, block.kind.model),
-            ("shapes", first.kind.cell, block.kind.cell),
-            ("orders", first.kind.order, block.kind.order),
-        ):
-            if a != b:
-                block.card.fail(
-                    f"{block.kind.name} elements stand beside {first.kind.name} elements "
-                    f"({first.card.place}): all elements must be of one of the {what}; mesh the "
-                    "model with one element shape and order"
-                )
-    return first.kind
-
-
-def _check_nodes(card: Card, labels: Ints, nodes: Ints) -> None:
-    """Refuse elements that have one node twice."""
-    ordered = np.sort(nodes, axis=1)
-    bad = np.flatnonzero((np.diff(ordered, axis=1) == 0).any(axis=1))
-    if len(bad):
-        card.fail(
-            f"{len(bad)} of {len(labels)} elements have a node more than once, the first is "
-            f"element {int(labels[bad[0]])}; degenerate elements are not available: mesh that "
-            "place with whole elements"
-        )

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
@@ -31,6 +32,8 @@ from fxcrack.deck.thermal import NodalField
 
 _TYPES = ("CRITICAL STRESS", "COD", "CRACK LENGTH", "VCCT", "ENHANCED VCCT", "FATIGUE")
 _LAWS = ("BK", "POWER", "REEDER")
+_UPPER = 0.85
+"""Upper limit r2 of fatigue where the deck gives none."""
 _MODES = ("GIc", "GIIc", "GIIIc")
 
 
@@ -286,8 +289,14 @@ def _rates(card: Card, kind: str, nodal: dict[str, NodalField] | None) -> Criter
             row.number(2),
             row.number(3),
             row.number(4, 0.01),
-            row.number(5, 0.85),
+            row.number(5, _UPPER) or _UPPER,
         )
+        if row.text(5) and row.number(5) == 0.0:
+            log.warn(
+                "%s: r2 = 0 would let every element fail in one cycle; it counts as left out, %g",
+                card.place,
+                _UPPER,
+            )
         return Fatigue(**toughness, **options, paris=paris)
     if card.has("UNSTABLE GROWTH TOLERANCE"):
         given = card.options["UNSTABLEGROWTHTOLERANCE"]

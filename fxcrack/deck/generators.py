@@ -41,10 +41,10 @@ def _members(row: Row, i: int, space: Space, kind: str) -> Ints:
 
 def _at(row: Row, space: Space, labels: Ints) -> Array:
     """Positions of nodes that must exist, shape (n, 3)."""
-    found = space.nodes.find(labels)
-    if np.any(found < 0):
-        row.fail(f"node {int(labels[found < 0][0])} is not defined; define it before this card")
-    return np.asarray(space.nodes.rows[found])
+    known, rows = space.nodes.look_up(labels)
+    if not known.all():
+        row.fail(f"node {int(labels[~known][0])} is not defined; define it before this card")
+    return np.asarray(rows)
 
 
 def _check_size(row: Row, count: int) -> None:
@@ -189,9 +189,9 @@ def _reflected(card: Card, rows: list[Row], x: Array) -> Array:
 def _find(row: Row, space: Space, element: int) -> tuple[Elements, Ints]:
     """The block of an element and its nodes."""
     for block in space.elements.values():
-        at = block.table.find(np.array([element]))[0]
-        if at >= 0:
-            return block, np.asarray(block.table.rows[at], dtype=np.int64)
+        known, rows = block.table.look_up(np.array([element]))
+        if known[0]:
+            return block, np.asarray(rows[0], dtype=np.int64)
     return row.fail(f"element {element} is not defined; define it before this card")
 
 
@@ -229,9 +229,8 @@ def copy_elements(card: Card, space: Space) -> None:
     of_element = int(card.number("ELEMENT SHIFT", 0.0))
     of_node = int(card.number("SHIFT NODES", 0.0))
     for block in space.elements.values():
-        at = block.table.find(wanted)
-        labels = wanted[at >= 0] + of_element
-        rows = block.table.rows[at[at >= 0]] + of_node
+        known, found = block.table.look_up(wanted)
+        labels, rows = wanted[known] + of_element, found[known] + of_node
         if len(labels):
             if labels.min() <= 0 or rows.min() <= 0:
                 card.fail("the shifts lead to a number that is not positive")

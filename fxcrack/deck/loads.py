@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
-    AmplitudeLike,
     BodyForce,
     Field,
     Load,
@@ -20,7 +20,7 @@ from fxcrack.continuum.loads import (
     Traction,
 )
 from fxcrack.deck.cards import Card, Row, key, label, squeeze
-from fxcrack.deck.distributing import Distributing
+from fxcrack.deck.constraints import Carrier
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.report import Report
@@ -87,7 +87,7 @@ class Loads:
         amplitudes: Its amplitudes.
         report: Takes notes.
         finite: Whether bodies turn far (NLGEOM).
-        distributed: Couplings by their reference nodes, whose loads they distribute.
+        carriers: What carries the loads of reference nodes and nodes of equations, by node.
     """
 
     def __init__(
@@ -97,13 +97,13 @@ class Loads:
         report: Report,
         *,
         finite: bool,
-        distributed: Mapping[int, Distributing],
+        carriers: Mapping[int, Carrier],
     ) -> None:
         self._flat = flat
         self._amplitudes = amplitudes
         self._report = report
         self._finite = finite
-        self._distributed = distributed
+        self._carriers = carriers
         self._entries: dict[tuple[str, ...], LoadEntry] = {}
         self._past: list[Period] = []
 
@@ -197,7 +197,7 @@ class Loads:
             row.fail("forces that turn with the body are not available")
         dof = row.whole(1)
         nodes = self._flat.nodes(row.card, row.text(0), row.index)
-        if len(nodes) == 1 and int(nodes[0]) in self._distributed:
+        if len(nodes) == 1 and int(nodes[0]) in self._carriers:
             if dof not in ((1, 2, 6) if self._flat.kind.gdim == 2 else (1, 2, 3, 4, 5, 6)):
                 row.fail(f"component {dof} of a load on a reference node is not available")
             return self._force_entry(row, dof)
@@ -261,9 +261,9 @@ class Loads:
         out: list[Load] = []
         for (name, _), (entry, amplitude, force) in found.items():
             nodes = self._flat.nodes(entry.row.card, name, entry.row.index)
-            if len(nodes) == 1 and int(nodes[0]) in self._distributed:
-                coupling = self._distributed[int(nodes[0])]
-                out.append(self._distribute(coupling, entry, amplitude, force, groups))
+            if len(nodes) == 1 and int(nodes[0]) in self._carriers:
+                carrier = self._carriers[int(nodes[0])]
+                out.append(self._distribute(carrier, entry, amplitude, force, groups))
                 continue
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
@@ -280,7 +280,7 @@ class Loads:
 
     def _distribute(
         self,
-        coupling: Distributing,
+        carrier: Carrier,
         entry: LoadEntry,
         amplitude: AmplitudeLike,
         load: Array,
@@ -288,14 +288,14 @@ class Loads:
     ) -> Load:
         """A load on the reference node as forces on the nodes of its surface."""
         flat, gdim = self._flat, self._flat.kind.gdim
-        if self._finite and coupling.turns(load[:3], load[3:]):
+        if self._finite and carrier.turns(load[:3], load[3:]):
             entry.row.fail(
                 "with NLGEOM a coupling distributes forces through the centre of its surface only, "
                 "neither moments nor forces beside it; write NLGEOM=NO"
             )
-        forces = coupling.forces(entry.row, load[:3], load[3:], gdim) * len(coupling.nodes)
-        where = groups.nodes(coupling.name, coupling.nodes, words="coupling")
-        x = flat.points[coupling.nodes][:, :gdim]
+        forces = carrier.forces(entry.row, load[:3], load[3:], gdim) * len(carrier.nodes)
+        where = groups.nodes(carrier.name, carrier.nodes, words="coupling")
+        x = flat.points[carrier.nodes][:, :gdim]
         fields: list[Field] = []
         for values in forces.T:
             same = np.ptp(values) <= 1e-14 * np.abs(forces).max()

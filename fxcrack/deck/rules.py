@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.materials import Material, Plastic
 from fxcrack.continuum.section import Section
+from fxcrack.deck.cards import Card
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.loads import Loads
 from fxcrack.deck.model import Model
 from fxcrack.deck.procedures import Procedure
 from fxcrack.deck.properties import Sections
-from fxcrack.deck.supports import Boundary
+from fxcrack.deck.supports import AnySupport, Boundary
 from fxcrack.deck.thermal import Temperatures
 
 
@@ -115,4 +117,24 @@ def check_explicit(
         )
 
 
-__all__ = ["check_density", "check_explicit"]
+def check_constraints(supports: Sequence[AnySupport], cards: Sequence[Card]) -> None:
+    """Refuse couplings and equations in explicit dynamics.
+
+    Args:
+        supports: What the constraints are in the words of a scene.
+        cards: Model data.
+
+    Raises:
+        DeckError: One is more than a prescribed displacement.
+    """
+    if not any(isinstance(s, Coupling | Equation) for s in supports):
+        return
+    kinds = ("KINEMATIC", "DISTRIBUTING", "RIGIDBODY", "MPC", "EQUATION")
+    card = next(c for c in cards if c.keyword in kinds)
+    card.fail(
+        "couplings and equations whose reference is free are not available in explicit dynamics; "
+        "prescribe all its components by *BOUNDARY, or load the nodes themselves"
+    )
+
+
+__all__ = ["check_constraints", "check_density", "check_explicit"]

@@ -10,7 +10,7 @@ from rich.console import Console
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
 from fxcrack.deck.cards import DeckError
-from fxcrack.deck.deck import check_deck, read_deck
+from fxcrack.deck.deck import check_deck, read_deck, stopped
 from fxcrack.deck.tips import TipReport
 from fxcrack.history import History
 from fxcrack.output.fields import write_fields
@@ -68,6 +68,8 @@ def run_deck(
         observers = [tips] if any(step.frequency.values()) else []
         history = deck.run_step(step, save=out / "history.csv", observers=observers)
         console.print(f"step '{step.name}': {history.reason}", markup=False, soft_wrap=True)
+        if stopped(history):
+            break
     history = deck.scene.history
     (with_usual_names(history) if usual_names else history).to_csv(out / "history.csv")
     history.to_json(out / "history.json")

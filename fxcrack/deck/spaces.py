@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.deck.cards import Card
 from fxcrack.deck.elements import ElementType
 
@@ -31,58 +31,108 @@ def distinct(values: Ints) -> Ints:
 class Numbered:
     """Rows with a number each; a number given again replaces the row before.
 
+    Rows that are added in many portions are kept as sorted runs, of which a later one that has come
+    up to half the size of the one before is merged with it: the work is n log n in all.
+
     Args:
         width: Columns of the rows.
     """
 
     def __init__(self, width: int) -> None:
         self._width = width
-        self._labels: list[Ints] = []
-        self._rows: list[Any] = []
-        self._dirty = False
+        self._runs: list[tuple[Ints, Any]] = []
 
     def add(self, labels: Ints, rows: Array | Ints) -> None:
         """Append rows, shape (n, width), with their numbers, shape (n,)."""
-        self._labels.append(np.asarray(labels, dtype=np.int64))
-        self._rows.append(rows)
-        self._dirty = True
-
-    def _merge(self) -> None:
-        if not self._dirty:
+        labels = np.asarray(labels, dtype=np.int64)
+        if not len(labels):
             return
-        labels, rows = np.concatenate(self._labels), np.concatenate(self._rows)
-        if np.any(np.diff(labels) <= 0):
-            # the last row of each number
-            _, last = np.unique(labels[::-1], return_index=True)
-            kept = len(labels) - 1 - last
-            labels, rows = labels[kept], rows[kept]
-        self._labels, self._rows, self._dirty = [labels], [rows], False
+        if np.any(labels[1:] <= labels[:-1]):
+            labels, rows = _last_of_each(labels, np.asarray(rows))
+        self._runs.append((labels, rows))
+        while len(self._runs) > 1 and 2 * len(self._runs[-1][0]) >= len(self._runs[-2][0]):
+            self._join()
+
+    def _join(self) -> None:
+        """Merge the last two runs; rows of the later one count."""
+        (old, old_rows), (new, new_rows) = self._runs[-2:]
+        if new[-1] < old[0]:
+            merged = np.concatenate((new, old)), np.concatenate((new_rows, old_rows))
+        else:
+            labels, rows = np.concatenate((old, new)), np.concatenate((old_rows, new_rows))
+            merged = (labels, rows) if old[-1] < new[0] else _last_of_each(labels, rows)
+        self._runs[-2:] = [merged]
+
+    def _merged(self) -> tuple[Ints, Any]:
+        while len(self._runs) > 1:
+            self._join()
+        if not self._runs:
+            return np.zeros(0, dtype=np.int64), np.zeros((0, self._width))
+        return self._runs[0]
 
     @property
     def labels(self) -> Ints:
         """Numbers, ascending, shape (n,)."""
-        self._merge()
-        return self._labels[0] if self._labels else np.zeros(0, dtype=np.int64)
+        return self._merged()[0]
 
     @property
     def rows(self) -> Any:
         """Rows in the order of :attr:`labels`, shape (n, width)."""
-        self._merge()
-        return self._rows[0] if self._rows else np.zeros((0, self._width))
+        return self._merged()[1]
 
     def find(self, labels: Ints) -> Ints:
         """Position of each number among :attr:`labels`, -1 where there is none."""
-        known = self.labels
-        if not len(known):
-            return np.full(np.shape(labels), -1, dtype=np.int64)
-        at = np.minimum(np.searchsorted(known, labels), len(known) - 1)
-        return np.where(known[at] == labels, at, -1)
+        return _places(self.labels, labels)
+
+    def look_up(self, labels: Ints) -> tuple[Bools, Any]:
+        """Rows of some numbers without merging what was added.
+
+        Args:
+            labels: The numbers, shape (n,).
+
+        Returns:
+            Whether each exists, shape (n,), and their rows, shape (n, width); rows of those that do
+            not are 0.
+        """
+        labels = np.asarray(labels, dtype=np.int64)
+        known = np.zeros(len(labels), dtype=bool)
+        kind = self._runs[0][1].dtype if self._runs else float
+        out = np.zeros((len(labels), self._width), dtype=kind)
+        for numbers, rows in reversed(self._runs):
+            left = np.flatnonzero(~known)
+            if not len(left):
+                break
+            at = _places(numbers, labels[left])
+            out[left[at >= 0]] = rows[at[at >= 0]]
+            known[left[at >= 0]] = True
+        return known, out
 
     def copy(self) -> Numbered:
         """A copy to which rows can be added."""
         out = Numbered(self._width)
         out.add(self.labels, self.rows)
         return out
+
+
+def _ascends(labels: Ints) -> bool:
+    """Whether every number is larger than the one before."""
+    return bool(np.all(labels[1:] > labels[:-1]))
+
+
+def _places(known: Ints, labels: Ints) -> Ints:
+    """Position of each number among ascending ones, -1 where there is none."""
+    if not len(known):
+        return np.full(np.shape(labels), -1, dtype=np.int64)
+    at = np.minimum(np.searchsorted(known, labels), len(known) - 1)
+    return np.where(known[at] == labels, at, -1)
+
+
+def _last_of_each(labels: Ints, rows: Any) -> tuple[Ints, Any]:
+    """Numbers in ascending order, each once, with the last of its rows."""
+    order = np.argsort(labels, kind="stable")
+    ordered = labels[order]
+    last = np.append(ordered[1:] != ordered[:-1], True)
+    return ordered[last], rows[order[last]]
 
 
 @dataclass
@@ -113,10 +163,15 @@ class NamedSet:
 
     def add(self, space: str, labels: Ints, *, ordered: bool = False) -> None:
         """Append members of a space; sorted unless their order counts."""
-        both = np.concatenate((self.members.get(space, np.zeros(0, dtype=np.int64)), labels))
+        known = self.members.get(space, np.zeros(0, dtype=np.int64))
+        both = np.concatenate((known, labels))
         if ordered:
             both = both[np.sort(np.unique(both, return_index=True)[1])]
-        self.members[space] = both if ordered else distinct(both)
+        elif not (
+            _ascends(labels) and (not len(known) or not len(labels) or labels[0] > known[-1])
+        ):
+            both = distinct(both)
+        self.members[space] = both
 
     @property
     def home(self) -> Ints:

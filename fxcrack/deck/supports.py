@@ -1,23 +1,22 @@
 """Prescribed displacements of a deck: ``*BOUNDARY``, and constraints whose reference moves so.
 
 Every degree of freedom follows the card that named it last; where cards overlap, groups of nodes
-with the same history are formed. ``*EQUATION``, ``*COUPLING`` with ``*KINEMATIC`` and ``*RIGID
-BODY`` are prescribed displacements where the motion of their reference is prescribed in all steps;
-a reference that is free or loaded is refused.
+with the same history are formed. Constraints whose reference moves as prescribed in all steps are
+prescribed displacements (:mod:`fxcrack.deck.constraints` has the others).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.node_supports import Rotation, Support, Symmetry
 from fxcrack.deck.cards import Card, Row, label
-from fxcrack.deck.distributing import Distributing
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track, combined
@@ -32,7 +31,7 @@ _NAMED = {
     "YASYMM": (1, 3, 5),
     "ZASYMM": (1, 2, 6),
 }
-AnySupport = Displacement | Support
+AnySupport = Displacement | Support | Constraint
 _DOFS = 6
 _AXES = "xyz"
 
@@ -221,20 +220,46 @@ class Boundary:
         entries = self.owner[:, dof, node].astype(np.int64)
         return None if np.any(entries < 0) or not len(entries) else self.track(entries)
 
-    def check_free(self, distributed: Mapping[int, Distributing]) -> None:
-        """Refuse prescribed motion of nodes whose loads are distributed.
+    def motion(self, node: int, dof: int, card: Card, name: str) -> Track | None:
+        """What a component of a reference node does; None where it is free in all steps.
+
+        Args:
+            node: The node.
+            dof: Its component, 0 to 5.
+            card: The constraint, for messages.
+            name: Its name.
 
         Raises:
-            DeckError: There is one.
+            DeckError: It is prescribed in some steps and free in others.
         """
-        for node, coupling in distributed.items():
-            if np.any(self.owner[:, :, node] >= 0):
-                entry = self.entries[int(self.owner[:, :, node].max())]
-                entry.card.fail(
-                    f"'{entry.name}' is the reference of the distributing coupling "
-                    f"'{coupling.name}', whose motion cannot be prescribed; use *KINEMATIC, or "
-                    "load it by *CLOAD"
-                )
+        entries = self.owner[:, dof, node].astype(np.int64)
+        if not len(entries) or np.all(entries < 0):
+            return None
+        if np.any(entries < 0):
+            card.fail(
+                f"component {dof + 1} of the reference node of '{name}' is prescribed in some "
+                "steps and free in others; fxcrack holds the same components in all steps"
+            )
+        return self.track(entries)
+
+    def share(self, nodes: Ints, others: Ints) -> int:
+        """Prescribe displacements of other nodes, where they are free, as those of nodes are.
+
+        Args:
+            nodes: The nodes, shape (n,).
+            others: One for each, shape (n,).
+
+        Returns:
+            For how many of them something is new.
+        """
+        theirs, ours = self.owner[:, :3, others], self.owner[:, :3, nodes]
+        new = (theirs < 0) & (ours >= 0)
+        self.owner[:, :3, others] = np.where(new, ours, theirs)
+        return int(new.any(axis=(0, 1)).sum())
+
+    def release(self, node: int, dofs: Sequence[int]) -> None:
+        """Leave it to a constraint to prescribe some components of a node."""
+        self.owner[:, list(dofs), node] = -1
 
     # -- the scene -----------------------------------------------------------------------
 
@@ -321,10 +346,10 @@ class Boundary:
         ]
 
     def link_displacements(self, links: Sequence[Link], groups: Groups) -> list[AnySupport]:
-        """Supports that constraints stand for.
+        """Supports that constraints stand for whose references are prescribed.
 
         Raises:
-            DeckError: A reference is free in some step, or moves in several ways at once.
+            DeckError: A reference moves in several ways at once.
         """
         out: list[AnySupport] = []
         turns: dict[str, tuple[Link, dict[int, Track]]] = {}
@@ -332,13 +357,7 @@ class Boundary:
             tracks = []
             for node, dof, _ in link.terms:
                 track = self.of_node(node, dof)
-                if track is None:
-                    link.card.fail(
-                        f"component {dof + 1} of the reference node of '{link.name}' is free; only "
-                        "constraints whose reference moves as *BOUNDARY prescribes in all steps "
-                        "are available: prescribe that component (0 holds it), or load the nodes "
-                        "themselves"
-                    )
+                assert track is not None
                 tracks.append(track)
             factors = [f for _, _, f in link.terms]
             moving = [i for i, t in enumerate(tracks) if not t.zero]

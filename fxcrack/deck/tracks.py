@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fxcrack.base.arrays import Array
-from fxcrack.continuum.loads import Amplitude, AmplitudeLike, Ramp
+from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, Ramp
 from fxcrack.deck.cards import Card, key
 from fxcrack.deck.model import Model
 from fxcrack.deck.report import Report

@@ -11,7 +11,7 @@ import numpy as np
 from fxcrack.continuum.loads import Monitor
 from fxcrack.continuum.materials import Plastic
 from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
-from fxcrack.deck.constraints import read_links
+from fxcrack.deck.constraints import read_constraints
 from fxcrack.deck.contact import Contacts
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.general_contact import GENERAL
@@ -21,7 +21,13 @@ from fxcrack.deck.model import Family, Model
 from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
 from fxcrack.deck.properties import Sections, read_sections
 from fxcrack.deck.report import Report
-from fxcrack.deck.rules import check_density, check_explicit, check_shells, density_of
+from fxcrack.deck.rules import (
+    check_constraints,
+    check_density,
+    check_explicit,
+    check_shells,
+    density_of,
+)
 from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
@@ -44,7 +50,16 @@ _IN_MODEL = frozenset(
     (
         *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
         *("DISTRIBUTING",),
-        *("EQUATION", "RIGIDBODY", "CLEARANCE", "NODALENERGYRATE", "CONTROLS", *GENERAL),
+        *(
+            "EQUATION",
+            "MPC",
+            "KINEMATICCOUPLING",
+            "RIGIDBODY",
+            "CLEARANCE",
+            "NODALENERGYRATE",
+            "CONTROLS",
+            *GENERAL,
+        ),
     )
 )
 
@@ -92,8 +107,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
     boundary = Boundary(flat, periods)
     boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
-    links, distributed = read_links(cards, flat)
-    loads = Loads(flat, amplitudes, report, finite=finite, distributed=distributed)
+    constraints = read_constraints(cards, flat)
+    loads = Loads(flat, amplitudes, report, finite=finite, carriers=constraints.carriers)
     temperatures = Temperatures(flat, report)
     temperatures.start(_initial(cards, "TEMPERATURE"))
     contacts = Contacts(
@@ -119,9 +134,12 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         check_density(moving[0], sections, model)
     if explicit:
         check_explicit(moving[0], flat, sections, loads, temperatures, boundary)
-    supports = boundary.displacements(groups)
-    supports += boundary.link_displacements(links, groups)
-    boundary.check_free(distributed)
+    if not explicit:
+        contacts.share_supports(boundary)
+    constrained = constraints.supports(boundary, groups)
+    if explicit:
+        check_constraints(constrained, cards)
+    supports = boundary.displacements(groups) + constrained
     held = np.unique(
         np.concatenate(
             [np.zeros(0, dtype=np.int64), *(n for d in range(3) for _, n in boundary.histories(d))]
@@ -183,15 +201,17 @@ def _order(model: Model, report: Report, order: int | None, *, explicit: bool) -
 
 
 def _model_cards(flat: Flat) -> list[Card]:
-    """Model data, those inside parts refused where they would need the names of a part."""
-    for placed in flat.placed.values():
-        for card in placed.space.others:
-            if placed.space is not flat.model.root and card.keyword in _IN_MODEL:
-                card.fail("it stands inside a part or instance; move it behind *END ASSEMBLY")
-    for card in flat.model.cards:
+    """Model data; those of a part once for each of its instances, with the names of that."""
+    inside = [
+        replace(card, home=place)
+        for place, placed in flat.placed.items()
+        if placed.space is not flat.model.root
+        for card in placed.space.others
+    ]
+    for card in (*flat.model.cards, *inside):
         if card.keyword in _IN_STEPS and card.keyword not in _IN_MODEL:
             card.fail("it belongs into a *STEP")
-    return flat.model.cards
+    return [*inside, *flat.model.cards]
 
 
 def _check_steps(steps: Sequence[Family], *, explicit: bool) -> None:

@@ -18,11 +18,11 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
+from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress
 from fxcrack.continuum.loads import (
-    AmplitudeLike,
     BodyForce,
     Displacement,
     Load,
@@ -31,7 +31,6 @@ from fxcrack.continuum.loads import (
     PointForce,
     PointMoment,
     Pressure,
-    Ramp,
     Traction,
 )
 from fxcrack.continuum.temperature import Temperature
@@ -43,29 +42,22 @@ from fxcrack.criteria import (
     RampRelease,
     StepRelease,
 )
-from fxcrack.deck.elements import FACES, added_nodes, element_type, face_nodes, to_dolfinx
 from fxcrack.deck.gather import Gathered, gather
 from fxcrack.deck.lines import broken, number, set_lines
 from fxcrack.deck.procedures import DeckStep
+from fxcrack.deck.write_constraints import coupling_lines, equation_lines
 from fxcrack.deck.write_explicit import explicit_interface
+from fxcrack.deck.write_mesh import MeshLines
 from fxcrack.deck.write_properties import criterion_lines, material_lines
 from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
 from fxcrack.interface.pairing import Interface, Pair
 from fxcrack.interface.supports import AnySupport
-from fxcrack.mesh.raw import reference
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.static import Static
-
-_NODES = {
-    "triangle": (3, 6),
-    "quadrilateral": (4, 8),
-    "tetrahedron": (4, 10),
-    "hexahedron": (8, 20),
-}
 
 
 def write_deck(
@@ -126,10 +118,17 @@ class _Writer:
     inertia: Inertia | None = None
     explicit: bool = False
     contact: list[str] = field(default_factory=list)
+    references: dict[tuple[object, ...], int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Begin with the mesh."""
+        self._body = MeshLines(self.scene, self.mesh)
 
     def lines(self, steps: Sequence[Static | Cycles | Explicit | DeckStep]) -> list[str]:
         """The whole deck."""
         given = self.scene.input
+        if given.stabilise is not None:
+            refuse("the argument stabilise of the scene")
         if given.order is not None and given.order != self.scene.mesh.order:
             refuse(
                 f"a displacement of order {given.order} on elements of order "
@@ -145,7 +144,7 @@ class _Writer:
                 refuse(f"the effect {type(effect).__name__}")
             if isinstance(effect, Inertia):
                 self.inertia = effect
-        model = [*self._mesh(), *self._properties(), *self._interfaces(), *self._velocity()]
+        model = [*self._body.lines(), *self._properties(), *self._interfaces(), *self._velocity()]
         conditions = [*self._supports(), *self._loads()]
         tail: list[str] = []
         start = 0.0
@@ -154,90 +153,6 @@ class _Writer:
             start = end
         return ["*HEADING", f"written by fxcrack: {self.scene.mesh.name}", *model, *self.sets,
                 *self._amplitudes(), *tail]  # fmt: skip
-
-    # -- mesh ----------------------------------------------------------------------------
-
-    def _mesh(self) -> list[str]:
-        model, mesh = self.scene.input.model, self.mesh
-        if mesh is None:
-            return []
-        prefix = {PlaneStrain: "CPE", PlaneStress: "CPS", Axisymmetric: "CAX"}.get(
-            type(model), "C3D"
-        )
-        n = _NODES[mesh.cell][mesh.order - 1]
-        kind = element_type(f"{prefix}{n}")
-        assert not isinstance(kind, str)
-        inverse = np.argsort(to_dolfinx(mesh.cell, mesh.order))
-        cells = mesh.cells[:, inverse]
-        dropped = np.zeros(len(mesh.points), dtype=bool)
-        if kind.serendipity:
-            dropped[cells[:, n:]] = True
-            self._check_centres(cells, kind, mesh)
-        out = ["*NODE"]
-        out += [
-            f"{i + 1}, " + ", ".join(number(c) for c in x)
-            for i, x in enumerate(mesh.points)
-            if not dropped[i]
-        ]
-        out.append(f"*ELEMENT, TYPE={kind.name}, ELSET=ALL_ELEMENTS")
-        for i, row in enumerate(cells[:, :n]):
-            words = [str(i + 1), *(str(node + 1) for node in row)]
-            out += broken(words, 16)
-        for name, (dim, members) in mesh.groups.items():
-            if dim == self.scene.mesh.tdim:
-                out += set_lines("ELSET", name, members)
-            elif dim == self.scene.mesh.tdim - 1:
-                out += self._surface(name, members)
-            elif len(members := members[~dropped[members]]):
-                out += set_lines("NSET", name, members)
-        self._dropped = dropped
-        return out
-
-    @staticmethod
-    def _check_centres(cells: Ints, kind: object, mesh: Gathered) -> None:
-        """Refuse centre nodes that a serendipity element would not put where they are."""
-        n = _NODES[mesh.cell][1]
-        parents, weights = added_nodes(kind)  # type: ignore[arg-type]
-        size = float(np.ptp(mesh.points, axis=0).max())
-        for i, (local, weight) in enumerate(zip(parents, weights, strict=True)):
-            at = np.einsum("k,nkc->nc", weight, mesh.points[cells[:, local]])
-            if np.abs(at - mesh.points[cells[:, n + i]]).max() > 1e-9 * size:
-                refuse(
-                    "curved elements whose centre nodes are not where an element without them "
-                    "would put them; use straight elements, or triangles and tetrahedra"
-                )
-
-    def _surface(self, name: str, facets: Ints) -> list[str]:
-        """A surface by element sides, from rows (cell, local facet)."""
-        mesh = self.mesh
-        assert mesh is not None
-        sides = _sides(mesh.cell, mesh.order)[facets[:, 1]] if len(facets) else facets[:, 1]
-        out, lines = [], []
-        for side in np.unique(sides):
-            elset = f"_{name}_S{side + 1}"
-            out += set_lines("ELSET", elset, facets[sides == side, 0], ", INTERNAL")
-            lines.append(f'"{elset}", S{side + 1}')
-        return [*out, f'*SURFACE, TYPE=ELEMENT, NAME="{name}"', *lines] if lines else []
-
-    def _nodes_of(self, group: str) -> Ints:
-        """Nodes of a group that the deck has."""
-        mesh = self.mesh
-        if mesh is None:
-            return np.zeros(0, dtype=np.int64)
-        dim, members = mesh.groups[group]
-        tdim = self.scene.mesh.tdim
-        if dim == tdim:
-            members = np.unique(mesh.cells[members])
-        elif dim == tdim - 1:
-            members = self._facet_nodes(members)
-        return np.asarray(members[~self._dropped[members]])
-
-    def _facet_nodes(self, facets: Ints) -> Ints:
-        mesh = self.mesh
-        assert mesh is not None
-        inverse = np.argsort(to_dolfinx(mesh.cell, mesh.order))
-        rows = face_nodes(mesh.cell, mesh.order)[_sides(mesh.cell, mesh.order)[facets[:, 1]]]
-        return np.unique(mesh.cells[facets[:, :1], inverse[rows]])
 
     # -- properties ----------------------------------------------------------------------
 
@@ -265,7 +180,7 @@ class _Writer:
         """Velocity of the nodes at the beginning."""
         if self.inertia is None or self.inertia.velocity is None or self.mesh is None:
             return []
-        nodes = np.flatnonzero(~self._dropped)
+        nodes = np.flatnonzero(~self._body.dropped)
         x = np.zeros((len(nodes), 3))
         x[:, : self.mesh.points.shape[1]] = self.mesh.points[nodes]
         out = ["*INITIAL CONDITIONS, TYPE=VELOCITY"]
@@ -294,13 +209,15 @@ class _Writer:
                 out += [
                     f"{node + 1}, " + ", ".join(number(g) for g in row)
                     for node, row in zip(nodes, rates, strict=True)
-                    if self.mesh is not None and not self._dropped[node]
+                    if self.mesh is not None and not self._body.dropped[node]
                 ]
         return out
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
-        if interface.pairing is not None:
+        if interface.stiffness is not None:
+            refuse(f"interface '{title}': stiffness of bonds")
+        if interface.pairing is not None and self.explicit:
             refuse(f"interface '{title}': pairing='{interface.pairing}'")
         if callable(interface.friction):
             refuse(f"interface '{title}': friction as a function of position")
@@ -311,9 +228,9 @@ class _Writer:
                 (slave, _group(pair.sides[0])), (master, _group(pair.sides[1]))
             ):  # fmt: skip
                 if name != group:
-                    out += self._surface(name, self.mesh.groups[group][1])
+                    out += self._body.surface(name, self.mesh.groups[group][1])
         if not debonds and not interface.contact and pair.bonded[pair.paired].all():
-            return [*out, f'*TIE, NAME="{title}"', f'"{slave}", "{master}"']
+            return [*out, f'*TIE, NAME="{title}"{_type(interface)}', f'"{slave}", "{master}"']
         if not interface.contact:
             log.warn(
                 "write_deck: interface '%s' has no contact, but open faces of a deck touch", title
@@ -325,7 +242,7 @@ class _Writer:
             f'*SURFACE INTERACTION, NAME="{title}"',
             *([number(pair_thickness)] if (pair_thickness := self._thickness()) else []),
             *(["*FRICTION", number(float(interface.friction))] if interface.friction else []),
-            f'*CONTACT PAIR, INTERACTION="{title}", SMALL SLIDING{adjust}',
+            f'*CONTACT PAIR, INTERACTION="{title}", SMALL SLIDING{adjust}{_type(interface)}',
             f'"{slave}", "{master}"',
         ]
         if pair.bonded.any():
@@ -333,7 +250,7 @@ class _Writer:
             name = f"{title} bonded"
             bonded = np.sort(self._slave_numbers(pair, pair.bonded))
             if self.mesh is not None:
-                out += set_lines("NSET", name, bonded[~self._dropped[bonded]])
+                out += set_lines("NSET", name, bonded[~self._body.dropped[bonded]])
             out += [
                 f"*INITIAL CONDITIONS, TYPE=CONTACT{normal}",
                 f'"{slave}", "{master}", "{name}"',
@@ -356,7 +273,9 @@ class _Writer:
         out: list[str] = []
         if pair.bonded.any() and self.mesh is not None:
             bonded = np.sort(self._slave_numbers(pair, pair.bonded))
-            out = set_lines("NSET", f"{interface.title} bonded", bonded[~self._dropped[bonded]])
+            out = set_lines(
+                "NSET", f"{interface.title} bonded", bonded[~self._body.dropped[bonded]]
+            )
         return out + found.in_model
 
     def _thickness(self) -> float:
@@ -366,7 +285,7 @@ class _Writer:
         """Nodes of the input at some slave nodes, in their order."""
         if self.mesh is None:
             return np.zeros(0, dtype=np.int64)
-        nodes = self._facet_nodes(self.mesh.groups[_group(pair.sides[0])][1])
+        nodes = self._body.facet_nodes(self.mesh.groups[_group(pair.sides[0])][1])
         gdim = self.mesh.points.shape[1]
         _, at = cKDTree(self.mesh.points[nodes]).query(pair.surface.x[chosen][:, :gdim])
         return np.asarray(nodes[at])
@@ -380,9 +299,14 @@ class _Writer:
     def _amplitudes(self) -> list[str]:
         out = []
         for amplitude, name in self.amplitudes.items():
-            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME')
-            times = [0.0, self.end] if isinstance(amplitude, Ramp) else list(amplitude.times)
-            values = times if isinstance(amplitude, Ramp) else list(amplitude.values)
+            smooth = isinstance(amplitude, SmoothStep)
+            kind = ", DEFINITION=SMOOTH STEP" if smooth else ""
+            out.append(f'*AMPLITUDE, NAME="{name}", TIME=TOTAL TIME{kind}')
+            if isinstance(amplitude, Amplitude | SmoothStep):
+                times, values = list(amplitude.times), list(amplitude.values)
+            else:
+                times = sorted({0.0, *amplitude.breaks(), self.end})
+                values = [amplitude(t) for t in times]
             if times[0] > 0.0:
                 times, values = [0.0, *times], [values[0], *values]
             words = [number(x) for pair in zip(times, values, strict=True) for x in pair]
@@ -391,7 +315,7 @@ class _Writer:
 
     def _name_nodes(self, name: str, group: str) -> None:
         """Make a set of a group's nodes under a name of the history."""
-        nodes = self._nodes_of(group)
+        nodes = self._body.nodes_of(group)
         if self.mesh is None or (name == group and self.mesh.groups[group][0] == 0):
             return
         lines = set_lines("NSET", name, nodes)
@@ -401,9 +325,30 @@ class _Writer:
     def _supports(self) -> list[str]:
         cards: list[str] = []
         for support in self.scene.input.supports:
+            if isinstance(support, Coupling):
+                cards += self._coupling(support)
+                continue
+            if isinstance(support, Equation):
+                for group, _, _ in support.terms:
+                    self._name_nodes(group, group)
+                self.sets += equation_lines(support)
+                continue
             self._name_nodes(support.title, support.where)
             cards += self._support(support)
         return cards
+
+    def _coupling(self, coupling: Coupling) -> list[str]:
+        """A coupling: its model data are kept with the sets, its motions belong to the step."""
+        mark = coupling.where, coupling.point, coupling.components, coupling.rotations
+        new = mark not in self.references
+        self.references.setdefault(mark, len(self.references) + 1)
+        node = self.references[mark] + (0 if self.mesh is None else len(self.mesh.points))
+        self._name_nodes(coupling.title, coupling.where)
+        model, boundary = coupling_lines(
+            coupling, node, new=new, amplitude=lambda: self._amplitude(coupling.amplitude)
+        )
+        self.sets += model
+        return boundary
 
     def _support(self, support: AnySupport) -> list[str]:
         if not isinstance(support, Displacement):
@@ -441,7 +386,7 @@ class _Writer:
             refuse(f"load '{title}' as a function of position")
         numbers = [float(v) for v in values]  # type: ignore[arg-type]
         if isinstance(load, PointForce):
-            n = max(len(self._nodes_of(load.where)), 1)
+            n = max(len(self._body.nodes_of(load.where)), 1)
             self._name_nodes(title, load.where)
             return [
                 f'*CLOAD, AMPLITUDE="{name}"',
@@ -454,8 +399,10 @@ class _Writer:
                      f"{number(v)}" for i, v in enumerate(numbers) if v]  # fmt: skip
             return [f'*DLOAD, AMPLITUDE="{name}"', *words]
         if title != load.where and self.mesh is not None:
-            self.sets += self._surface(title, self.mesh.groups[_group(load.where)][1])
+            self.sets += self._body.surface(title, self.mesh.groups[_group(load.where)][1])
         if isinstance(load, Pressure):
+            if load.follows_crack:
+                refuse(f"pressure '{title}' with follows_crack")
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
                 refuse(
@@ -521,6 +468,12 @@ class _Writer:
         return [head, *lines, *criterion_lines(title, debond.criterion, nodal)]
 
 
+def _type(interface: Interface) -> str:
+    """Parameter of a pair that says how nodes follow the master, where the scene does."""
+    words = {"node-to-surface": "NODE TO SURFACE", "surface-to-surface": "SURFACE TO SURFACE"}
+    return "" if interface.pairing is None else f", TYPE={words[interface.pairing]}"
+
+
 def _group(face: str | Face) -> str:
     """Name of the group of facets of a side of an interface."""
     if isinstance(face, str):
@@ -530,13 +483,3 @@ def _group(face: str | Face) -> str:
 
 def _as_deck_step(scene: Scene, step: Static | Cycles | Explicit, i: int) -> DeckStep:
     return DeckStep(f"step {i + 1}", step, tuple(d.interface.title for d in scene.debonds))
-
-
-def _sides(cell: str, order: int) -> Ints:
-    """Number of the deck's face, from 0, of each local facet of DOLFINx."""
-    tdim = 2 if cell in ("triangle", "quadrilateral") else 3
-    perm = to_dolfinx(cell, order)
-    closures = reference(cell, order).entity_closure_dofs[tdim - 1]
-    n = len(FACES[cell][0])
-    faces = [set(face) for face in FACES[cell]]
-    return np.array([faces.index({int(perm[i]) for i in c[:n]}) for c in closures])

@@ -150,7 +150,11 @@ class Friction:
         if known is None or known[0] is not system.schur or not np.array_equal(known[1], free):
             flat = self.components.ravel()
             inside = np.flatnonzero(flat >= 0)
-            _, k = system.cholesky.reduced(flat[inside])
+            first, n = (int(flat[inside[0]]) if len(inside) else 0), len(inside)
+            if not len(free) and np.array_equal(flat[inside], np.arange(first, first + n)):
+                k = system.schur[first : first + n, first : first + n]  # only read
+            else:
+                _, k = system.cholesky.reduced(flat[inside])
             if len(inside) < len(flat):
                 # a component that a support holds: its jump is zero
                 star, k = k, np.diag(np.full(len(flat), np.diagonal(k).mean()))

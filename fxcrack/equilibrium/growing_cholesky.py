@@ -19,6 +19,8 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF
 
 _BLOCK = 64
+AT_ONCE = 1024
+"""Unknowns appended at once: what that takes besides the factor stays small beside S."""
 _MARGIN = 1e-2
 """Part of what counts as zero that round-off really makes, at most (see ``round_off``); pivots
 between the two are real in bodies that are held."""
@@ -172,8 +174,12 @@ class GrowingCholesky:
         Returns:
             y = L^-1 S[free, extra], shape (n_free, k), and S* = S[extra, extra] - y^t y.
         """
+        star = self._matrix[np.ix_(extra, extra)]
+        if not len(self.free):
+            return np.zeros((0, len(extra))), star
         y = self.forward(self._matrix[np.ix_(self.free, extra)])
-        return y, self._matrix[np.ix_(extra, extra)] - y.T @ y
+        star -= y.T @ y
+        return y, star
 
     def append(self, extra: Ints) -> Array:
         """Free more unknowns.
@@ -202,7 +208,9 @@ class GrowingCholesky:
         """
         tile, info = lapack.dpotrf(star, lower=1, clean=1)
         if info > 0:
-            raise NotPositiveDefinite(int(extra[info - 1]))
+            every = np.concatenate([self.free, extra])
+            why = "" if self.restraint is None else self.restraint.find(every)
+            raise NotPositiveDefinite(int(extra[info - 1]), why)
         pivots = np.diagonal(tile) ** 2
         round_off = np.broadcast_to(self.round_off, len(self._matrix))
         zero = np.maximum(self._floor * self._matrix[extra, extra], round_off[extra])
@@ -260,6 +268,9 @@ class GrowingCholesky:
             return len(self.free)
         n, first = len(self.free), int(np.argmax(drop))
         keep = np.flatnonzero(~drop[first:]) + first
+        if n - first > max(AT_ONCE, first):
+            self._factor_anew(first, self.free[keep])
+            return first
         trailing = self._read(first, first, n)
         square = trailing @ trailing.T
         inner = keep - first
@@ -272,5 +283,22 @@ class GrowingCholesky:
         self._inverse = self._inverse[: first // _BLOCK]
         return first
 
+    def _factor_anew(self, first: int, keep: Ints) -> None:
+        """Replace all rows from one on by those of other unknowns, shape (k,), taken from S.
 
-__all__ = ["GrowingCholesky", "NotPositiveDefinite", "Restraint"]
+        With few rows before it costs a sixth of a factor of the trailing block, and no memory.
+        """
+        self.free = self.free[:first]
+        del self._strips[(first + _BLOCK - 1) // _BLOCK :]
+        self._inverse = self._inverse[: first // _BLOCK]
+        for i in range(0, len(keep), AT_ONCE):
+            extra = keep[i : i + AT_ONCE]
+            y, star = self.reduced(extra)
+            tile, info = lapack.dpotrf(star, lower=1, clean=1)
+            if info > 0:  # less is free than before: it cannot be but for round-off
+                raise NotPositiveDefinite(int(extra[info - 1]))
+            self._write(first + i, np.hstack([y.T, tile]))
+            self.free = np.concatenate([self.free, extra])
+
+
+__all__ = ["AT_ONCE", "GrowingCholesky", "NotPositiveDefinite", "Restraint"]

@@ -21,7 +21,7 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.equilibrium.cohesive_bonds import CohesiveBonds
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
 from fxcrack.equilibrium.coulomb import FrictionState
-from fxcrack.equilibrium.growing_cholesky import GrowingCholesky, NotPositiveDefinite
+from fxcrack.equilibrium.growing_cholesky import AT_ONCE, GrowingCholesky, NotPositiveDefinite
 
 _PROPORTIONAL = 4.0 * np.finfo(float).eps
 
@@ -173,8 +173,17 @@ class JumpSystem:
             NotPositiveDefinite: Nothing restrains one of them any more; nothing is changed.
         """
         new = np.asarray(components)[~self.free[components]]
-        if not len(new):
-            return
+        before = len(self.cholesky)
+        for i in range(0, len(new), AT_ONCE):
+            try:
+                self._append(new[i : i + AT_ONCE])
+            except NotPositiveDefinite:
+                if i:
+                    self.hold(self.cholesky.free[before:])
+                raise
+
+    def _append(self, new: Ints) -> None:
+        """Free some more components, shape (k,)."""
         left = self.cholesky.append(new)
         right = self._load_columns_at(new) - left @ self._forward
         tile = self.cholesky.corner(len(new))
@@ -261,8 +270,19 @@ class JumpSystem:
 
     def _product(self, rows: Ints | slice, x: Array) -> Array:
         """S x + c at some rows, for the leading entries x of all coordinates."""
-        out = self.schur[rows, : len(x)] @ x
+        if not isinstance(rows, slice) and len(rows) > max(AT_ONCE, len(self.schur) // 8):
+            out = (self.schur[:, : len(x)] @ x)[rows]  # without a copy of so much of S
+        else:
+            out = self.schur[rows, : len(x)] @ x
         return np.asarray(out if self.offset is None else out + self.offset[rows])
+
+    def _products(self, rows: Ints, moved: Ints, jump: Array) -> Array:
+        """S at some rows times jumps, shape (n_retained,), that are zero but for some, (k,)."""
+        if len(rows) * len(moved) > max(AT_ONCE**2, self.schur.size // 8):
+            out = (self.schur[:, : len(jump)] @ jump)[rows]  # without a copy of so much of S
+        else:
+            out = self.schur[np.ix_(rows, moved)] @ jump[moved]
+        return np.asarray(out)
 
     def _response(self, loads: Array) -> Array:
         """Jumps of the free components under loads alone, shape (n_free,).
@@ -299,7 +319,7 @@ class JumpSystem:
         right = force[free]
         moved = np.flatnonzero(jump)
         if len(moved):
-            right = right - self.schur[np.ix_(free, moved)] @ jump[moved]
+            right = right - self._products(free, moved, jump)
         if np.any(right):
             part = part + self.cholesky.solve(right)
         jump[free] = part

@@ -7,8 +7,9 @@ have at its beginning, as long as the impulse presses; all others move freely:
 
 The work of the impulse is that of its mean force on the change of the jump, which is zero: contact
 takes no energy and gives none (Laursen and Chawla 1997). It acts before faces overlap, not after,
-so that they never do; the distance left is less than the way of one increment. With friction, slips
-begin where the increment does, and forces obey Coulomb's law.
+so that they never do; the distance left is less than the way of one increment. Faces that overlap
+at the beginning, by a new pairing on a bent surface, are apart at the end; that work is counted.
+With friction, slips begin where the increment does, and forces obey Coulomb's law.
 """
 
 from __future__ import annotations
@@ -35,12 +36,14 @@ class ImpulseWork:
         friction: Energy dissipated by friction.
         beyond: Energy that contact takes by the trapezoidal rule beyond friction, with what it adds
             to supports and bonds.
+        overlap: Work of impulses that pushed overlapping faces apart.
     """
 
     supports: Array
     bonds: float
     friction: float
     beyond: float
+    overlap: float
 
 
 class MovingContact:
@@ -55,6 +58,7 @@ class MovingContact:
         self._system, self._here = system, here
         self._gap = system.gap.copy()
         self._held = np.zeros(system.n_retained, dtype=bool)
+        self._overlaps = system.contact & (here.jump + self._gap < 0.0)
         if system.friction is not None:
             system.friction.commit(here.jump)
         rows = closed_components(system)
@@ -86,7 +90,8 @@ class MovingContact:
 
     def _set_gaps(self) -> None:
         system = self._system
-        system.gap[:] = np.where(self._held, -self._here.jump, self._gap)
+        stay = self._held & ~self._overlaps
+        system.gap[:] = np.where(stay, -self._here.jump, self._gap)
         if system.friction is not None:
             system.friction.gap[:] = system.gap[system.friction.components[:, 0]]
 
@@ -121,8 +126,9 @@ class MovingContact:
         bonds -= 0.5 * float(np.where(before != 0.0, before - means[0, :n], 0.0) @ step)
         moved = (end.loads - self._here.loads)[:n_supports]
         trapezoidal = 0.5 * float((before + after) @ step)
-        beyond = float(supports @ moved) - bonds - trapezoidal - friction
-        return ImpulseWork(supports, bonds, friction, beyond)
+        pushed = float((after * step)[self._overlaps].sum())
+        beyond = float(supports @ moved) - bonds - trapezoidal - friction + pushed
+        return ImpulseWork(supports, bonds, friction, beyond, pushed)
 
 
 def closed_components(system: ContactSystem) -> Ints:

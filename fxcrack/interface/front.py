@@ -13,6 +13,7 @@ the line has a say. Where places are equal otherwise, :func:`first_by_place` dec
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import cached_property
 
@@ -207,6 +208,19 @@ class Front:
     def release(self, nodes: Ints) -> None:
         """Release slave nodes, shape (n,), and discard the cached geometry around them."""
         self._set(nodes, bonded=False)
+
+    def undeformed(self) -> Front:
+        """The front where the bodies are undeformed; this one stays."""
+        out = copy(self)
+        out.surface, out._cache = self._undeformed, {}
+        return out
+
+    def without(self, nodes: Ints) -> Front:
+        """The front as releasing slave nodes, shape (n,), would leave it; this one stays."""
+        out = copy(self)
+        out.bonded, out._cache = self.bonded.copy(), {}
+        out.bonded[nodes] = False
+        return out
 
     def bond(self, nodes: Ints) -> None:
         """Bond slave nodes, shape (n,), again whose release is undone."""

@@ -20,6 +20,9 @@ and the states of an interface are statements about single coordinates:
 
 T stays as it is when nodes are released, and slave and master may belong to different ranks.
 
+Nodes at which shells meet in a kink or a T joint follow each other as
+:mod:`fxcrack.continuum.shell_joints` says; they have no jump.
+
 Where the unknowns of a node are more than its displacement (shells), u_s and u_m above are those of
 points on the bonded faces, u_point = P q_node with P = [1 Z] (:mod:`fxcrack.continuum.dof_layout`).
 Solved for the displacement of the slave node, a row of T holds a small block for each master,
@@ -43,12 +46,18 @@ Columns of T, in this order on each rank:
   (u = d times its shape), and empty columns for the borders of force patterns and monitors.
 
 A fixed jump has no column: it is zero.
+
+Dofs that follow others by couplings and equations (:mod:`fxcrack.interface.following`) have no
+column of their own but rows of T with the columns of what they follow. The jump of a slave node
+among them is zero where it is bonded and its masters belong to the same rigid set, and is given up
+where it is open.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -59,7 +68,10 @@ from scipy.sparse.csgraph import connected_components
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.interface.constrained_slaves import drop_constrained
+from fxcrack.interface.following import Following
 from fxcrack.interface.hierarchy import links_in_chain
+from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
@@ -144,9 +156,17 @@ def build_coordinates(
     gdim, comm = layout.gdim, layout.comm
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
-    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped)
+    nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped, further=layout.joints.nodes)
     which, value = supports.at_nodes(nodes)
     check_slaves(pairs, jumped, nodes, which, value, supports)
+    rigid = drop_constrained(pairs, jumped, supports.following, layout)
+    slaves = {
+        int(dof): (pair.title, x)
+        for pair, j in zip(pairs, jumped, strict=True)
+        for dof, x in zip(pair.surface.dofs[j], pair.surface.x[j], strict=True)
+        if len(layout.joints.nodes)
+    }
+    joined, *joint_entries = joint_terms(layout.joints, nodes, which, slaves)
     links = [
         _Link(pair, np.flatnonzero(j), nodes.find(pair.surface.dofs[j]))
         for pair, j in zip(pairs, jumped, strict=True)
@@ -158,13 +178,19 @@ def build_coordinates(
         rows[link.slaves] = which[link.nodes, :gdim]
         prescribed.append(rows)
     frames, held = align_frames(pairs, prescribed, jumped, supports, gdim)
+    held = [h | r[:, None] for h, r in zip(held, rigid, strict=True)]
     roles = [
         np.where(h | ~j[:, None], FIXED, r) for r, h, j in zip(roles, held, jumped, strict=True)
     ]
 
     # which owned dofs have a column of their own
     own = np.asarray(supports.which < 0)
-    follows = np.zeros((len(nodes), layout.n_unknowns), dtype=bool)  # other dofs, by T
+    following = supports.following
+    constrained: Ints = np.zeros(0, dtype=np.int64)
+    if following is not None:
+        constrained = following.mine(layout)[1]
+        own[constrained] = False
+    follows = joined  # other dofs, by T
     free_jump = np.zeros_like(follows)
     for link, role in zip(links, roles, strict=True):
         follows[link.nodes, :gdim] = True
@@ -191,6 +217,10 @@ def build_coordinates(
     column = np.full(layout.n_local, -1, dtype=np.int64)
     column[own] = start + np.arange(n_inner)
 
+    composed: tuple[Ints, sp.csr_matrix] | None = None
+    if following is not None:
+        their = _constraint_rows(following, layout, supports, column, first + n_retained, n_columns)
+        composed = following.dofs, their
     rows = _interface_rows(
         nodes,
         links,
@@ -201,10 +231,18 @@ def build_coordinates(
         np.where(which < 0, -1, first + n_retained + which),
         value,
         n_columns,
+        joint_entries,
+        composed,
     )
     mine = layout.dofs(np.arange(len(nodes))[nodes.mine])
+    followers, of_followers = local[follows_here], rows[mine[follows_here]]
+    if following is not None and composed is not None:
+        followers = np.concatenate([followers, constrained])
+        of_followers = sp.vstack(
+            [of_followers, composed[1][following.mine(layout)[0]]], format="csr"
+        )
     transform = _assemble(
-        layout, supports, column, local[follows_here], rows[mine[follows_here]], first + n_retained,
+        layout, supports, column, followers, of_followers, first + n_retained,
         (n_inner + (extra if comm.rank == 0 else 0), n_columns),
     )  # fmt: skip
     return JumpCoordinates(
@@ -238,6 +276,8 @@ def _interface_rows(
     support: Ints,
     value: Array,
     n_columns: int,
+    joined: Sequence[Any],
+    constrained: tuple[Ints, sp.csr_matrix] | None,
 ) -> sp.csr_matrix:
     """Rows of T for the dofs of all interface nodes, chains composed.
 
@@ -251,6 +291,8 @@ def _interface_rows(
         support: Columns of the supports that prescribe dofs, -1 where none does, same shape.
         value: Entries of these columns, same shape.
         n_columns: Columns of T.
+        joined: Rows, columns and entries of what the nodes of joints follow.
+        constrained: Global dofs that follow by couplings and equations, ascending, and their rows.
 
     Returns:
         Shape (n_unknowns n_interface_nodes, n_columns).
@@ -265,7 +307,16 @@ def _interface_rows(
     # a supported component of a slave moves like its masters', but its reaction is its own
     held = np.flatnonzero(prescribed >= 0)
     entries = [(rows, own[rows], np.ones(len(rows))), (held, prescribed[held], value.ravel()[held])]
+    if constrained is not None and len(constrained[0]):
+        dofs, its_rows = constrained
+        here = layout.dofs(nodes.nodes).ravel()
+        at = np.minimum(np.searchsorted(dofs, here), len(dofs) - 1)
+        inside = np.flatnonzero(dofs[at] == here)
+        block = its_rows[at[inside]].tocoo()
+        entries.append((inside[block.row], block.col, block.data))
     followed: list[tuple[Ints, Ints, Array]] = []
+    if len(joined[0]):
+        followed.append((joined[0], joined[1], joined[2]))
     for link, frame, jumps in zip(links, frames, retained, strict=True):
         k, s = link.slaves, link.nodes
         followed += _followed_unknowns(nodes, link, support[s] < 0)
@@ -290,12 +341,51 @@ def _interface_rows(
         names = ", ".join(f"'{link.pair.title}'" for link in links)
         raise InterfaceError(
             f"interfaces {names} form a cycle: a slave node is master of a node that is in turn "
-            "its master; exchange slave and master of one of them"
+            "its master; exchange slave and master of one of them, or make one interface of "
+            "surfaces that continue each other, mesh.joined('whole', ['first', 'second'])"
         )
     composed = base
-    for _ in range(links_in_chain(link.pair.hierarchy for link in links)):
+    longest = links_in_chain(link.pair.hierarchy for link in links)
+    for _ in range(longest if not len(joined[0]) else 2 * longest + 1):
         composed = base + chain @ composed
     return sp.csr_matrix(composed)
+
+
+def _constraint_rows(
+    following: Following,
+    layout: DofLayout,
+    supports: Supports,
+    column: Ints,
+    support_column: int,
+    n_columns: int,
+) -> sp.csr_matrix:
+    """Rows of T of all dofs that follow by couplings and equations; collective.
+
+    Args:
+        following: These dofs.
+        layout: Unknowns of nodes and their numbers.
+        supports: Prescribed components.
+        column: Column of each owned dof's own, -1 where it has none, shape (n_local,).
+        support_column: First column of the supports.
+        n_columns: Columns of T.
+
+    Returns:
+        Shape (n_following, n_columns), the same on every rank.
+    """
+    held = supports.which >= 0
+    columns = np.where(held, support_column + supports.which, column)
+    entries = np.where(held, supports.value, 1.0)
+    pairs = following.share_masters(layout, np.column_stack([columns.astype(float), entries]))
+    target = pairs[:, 0].astype(np.int64)  # a double holds whole numbers up to 2^53
+    rows = np.arange(len(target))
+    to_columns = sp.csr_matrix((pairs[:, 1], (rows, target)), shape=(len(target), n_columns))
+    first = support_column + len(supports.columns) - supports.n_motions
+    spread = sp.csr_matrix(
+        (np.ones(supports.n_motions), (np.arange(supports.n_motions),
+                                       first + np.arange(supports.n_motions))),
+        shape=(supports.n_motions, n_columns),
+    )  # fmt: skip
+    return sp.csr_matrix(following.matrix @ to_columns + following.prescribed @ spread)
 
 
 def _followed_unknowns(

@@ -86,6 +86,9 @@ class LumpedInterface:
         group_mass: Mass of the nodes with that of the slaves tied to them, shape (n_nodes,).
         inverse: 1/group_mass per component, 0 where prescribed, shape (n_nodes, gdim).
         compliance: H of the open rows per component, shape (n_open, gdim).
+        reach: Bound on what forces of one size on all open rows do to each of them, in any
+            direction: the compliance where rows do not act on each other, else the sum of
+            |B_i/m B_j| over the rows j, shape (n_open, gdim).
         accelerations: Accelerations of the nodes by the forces on them, those that are prescribed
             zero; on components of the nodes, shape (n_nodes gdim, n_nodes gdim).
         version: How often ties, masses or frames have changed.
@@ -202,7 +205,7 @@ class LumpedInterface:
             assert self.master is not None
             self._open_masters = self.master[self.open]
             both = self.inverse[self._open_slaves] + self.inverse[self._open_masters]
-            self.compliance = np.asarray(both)
+            self.compliance = self.reach = np.asarray(both)
             self._accelerate_pairs()
             return
         following = self.following
@@ -216,6 +219,10 @@ class LumpedInterface:
         self._root = sp.csr_matrix(self._jump @ motion)
         self._root_t = self._root.T.tocsr()
         self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
+        size = abs(self._root)
+        loose = self.inverse.max(axis=1, initial=0.0)  # forces of any direction, unlike supports
+        sums = size @ (loose * (size.T @ np.ones(len(self.open))))
+        self.reach = np.repeat(np.asarray(sums)[:, None], self.which.shape[1], axis=1)
 
     def _accelerate_pairs(self) -> None:
         """Accelerations where every slave has one master of its own: both of a tied pair share."""

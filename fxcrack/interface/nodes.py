@@ -51,6 +51,7 @@ class InterfaceNodes:
         pairs: Sequence[Pair],
         masters: Sequence[FacetSurface] = (),
         jumped: Sequence[npt.NDArray[np.bool_]] | None = None,
+        further: Ints | None = None,
     ) -> InterfaceNodes:
         """Nodes of interfaces.
 
@@ -59,9 +60,10 @@ class InterfaceNodes:
             pairs: Interfaces; their slave nodes and the masters of these.
             masters: Master surfaces, all of whose nodes are wanted as well.
             jumped: Per pair, the slave nodes that count, shape (n_nodes,); all by default.
+            further: Other global nodes that are wanted, shape (n,).
         """
         every = slice(None)
-        used = [m.dofs for m in masters]
+        used = [m.dofs for m in masters] + ([] if further is None else [further])
         for p, pair in enumerate(pairs):
             rows = every if jumped is None else jumped[p]
             used += [pair.surface.dofs[rows], pair.masters[rows].ravel()]

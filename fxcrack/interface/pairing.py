@@ -26,6 +26,7 @@ from fxcrack.base.checks import (
     list_of,
     number,
     one_of,
+    positive,
     shown,
     text,
 )
@@ -80,6 +81,9 @@ class Interface:
             only one; so it is where no slave node has a master at the start. Node-to-surface bonds
             of meshes that do not match hold only if the slave is the finer and softer side.
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
+        stiffness: Of bonds in ``Explicit``, force/length^3: normal, along the growth direction and
+            along the front, or "auto": that of the cells beside them. ``None``, as everywhere else:
+            bonds are exact, which costs nothing; a stiffness shortens the increment and lowers G.
         strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
             and ignored otherwise.
         name: What the history calls the interface; the slave's name by default.
@@ -95,6 +99,7 @@ class Interface:
     pairing: str | None = None
     gap: str = "adjust"
     strict: bool = False
+    stiffness: str | tuple[float, float, float] | None = None
     name: str | None = None
 
     def __post_init__(self) -> None:
@@ -125,6 +130,19 @@ class Interface:
         if not isinstance(self.gap, str) or self.gap not in ("adjust", "keep"):
             raise InterfaceError(f"gap = {shown(self.gap)}: choose 'adjust' or 'keep'")
         self._check_friction()
+        self._check_stiffness(where)
+
+    def _check_stiffness(self, where: str) -> None:
+        if self.stiffness is None or (isinstance(self.stiffness, str) and self.stiffness == "auto"):
+            return
+        given = list_of(self.stiffness)
+        if given is None or len(given) != 3:
+            raise InterfaceError(
+                f"{where}: stiffness = {shown(self.stiffness)} must be 'auto' or three numbers per "
+                "area, normal, along the growth direction and along the front"
+            )
+        positive(where, **{f"stiffness[{i}]": k for i, k in enumerate(given)})
+        keep(self, stiffness=tuple(float(k) for k in given))
 
     def _check_friction(self) -> None:
         if self.friction is None:

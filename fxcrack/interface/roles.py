@@ -36,6 +36,8 @@ _FINE = 1.05
 """Ratio of the lengths of facets from which one side counts as finer."""
 _WARN = 3.0
 """Ratio of stiffness from which a slave that does not suit is warned of."""
+_SAME = 1e-9
+"""Ratios that differ from a limit by this part of it, by round-off, have reached it."""
 
 
 class Role(Enum):
@@ -102,6 +104,11 @@ def matching(slave: FacetSurface, master: FacetSurface, foot: Projection, paired
     return bool(np.isin(number[len(known) :], number[: len(known)]).all())
 
 
+def _reaches(ratio: float, limit: float) -> bool:
+    """Whether a ratio is a limit or more, whatever round-off of other units or numbers does."""
+    return ratio >= limit * (1.0 - _SAME)
+
+
 def choose_role(
     title: str,
     pairing: str | None,
@@ -120,7 +127,7 @@ def choose_role(
         may_exchange: Whether the jumps may be those of the master's nodes.
     """
     if pairing == "node-to-surface":
-        if ratio > _WARN:
+        if _reaches(ratio, _WARN):
             log.warn(
                 "interface '%s': the slave is %.3g times as stiff as the master and their meshes "
                 "do not match; forces of node-to-surface bonds, and G from them, then vary from "
@@ -129,13 +136,14 @@ def choose_role(
                 ratio,
             )
         return Role.NODES
-    finer = fine > _FINE
-    if ratio > _STIFF:
+    finer = _reaches(fine, _FINE)
+    if _reaches(ratio, _STIFF):
         suits = False
-    elif ratio < 1.0 / _STIFF:
+    elif _reaches(1.0 / ratio, _STIFF):
         suits = True
     else:
-        suits = not finer and not (ratio > _WARN and fine > 1.0 / _FINE)
+        coarser = _reaches(1.0 / fine, _FINE)
+        suits = not finer and not (_reaches(ratio, _WARN) and not coarser)
     if pairing is None and may_exchange and not suits:
         log.info(
             "interface '%s': meshes do not match; jumps are those of the nodes of the master, "
@@ -143,7 +151,7 @@ def choose_role(
             title,
         )
         return Role.EXCHANGED
-    if finer and ratio > 1.0 / _WARN:
+    if finer and not _reaches(1.0 / ratio, _WARN):
         log.warn(
             "interface '%s': the slave is %.3g times finer than the master and %.3g times as "
             "stiff; on meshes that do not match, G then varies from node to node (by 10 %% for "

@@ -15,13 +15,16 @@ from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError, InterfaceError, raise_on_all_ranks
 from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint, Coupling, Equation
+from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry, rotation_values
 from fxcrack.continuum.shell_bodies import ShellBodies
+from fxcrack.interface.following import Following, collect_following
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
 
-AnySupport = Displacement | Support
+AnySupport = Displacement | Support | Constraint
 
 
 @dataclass(frozen=True)
@@ -35,12 +38,14 @@ class SupportColumn:
         scale: Prescribed displacement at amplitude 1 where it is the same on all dofs; the column
             then holds ones, its coordinate is a displacement and its conjugate the reaction.
             1 where it varies: the coordinate is the amplitude.
+        largest: Largest prescribed displacement at amplitude 1 on any of its dofs, where known.
     """
 
     title: str
     support: AnySupport
     moves: bool
     scale: float
+    largest: float = 0.0
 
     def coordinate(self, time: float) -> float:
         """Value of the column's coordinate at a time."""
@@ -55,11 +60,18 @@ class Supports:
         columns: One per component.
         which: Column number per owned dof, -1 where free, shape (n_local,).
         value: Entry of that column per owned dof, shape (n_local,).
+        following: Dofs that follow others; ``None`` where there are no couplings and equations.
+            The columns of prescribed motions of references are the last ones.
+        n_motions: Number of these.
+        constraints: The couplings and equations.
     """
 
     columns: tuple[SupportColumn, ...]
     which: Ints
     value: Array
+    following: Following | None = None
+    n_motions: int = 0
+    constraints: tuple[Constraint, ...] = ()
 
     def at_nodes(self, nodes: InterfaceNodes) -> tuple[Ints, Array]:
         """Supports of the interface nodes' unknowns; collective.
@@ -76,7 +88,7 @@ class Supports:
 
 
 def _prescribed(
-    continuum: Continuum, support: AnySupport, nodes: Ints
+    continuum: Continuum, support: Displacement | Support, nodes: Ints
 ) -> list[tuple[str, Ints, Array]]:
     """Name, unknown of each node (-1 for none) and value there of what a support prescribes.
 
@@ -141,15 +153,18 @@ def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Su
     """Number the prescribed components and place them on the dofs; collective.
 
     Raises:
-        InputError: Two supports prescribe different values for one dof, or a value is not finite.
+        InputError: Two supports prescribe different values for one dof, a value is not finite, or
+            couplings and equations contradict the supports or each other.
     """
+    constraints = [s for s in supports if isinstance(s, Coupling | Equation)]
+    plain = [s for s in supports if not isinstance(s, Coupling | Equation)]
     layout = continuum.layout
     which = np.full(layout.n_local, -1, dtype=np.int64)
     value = np.zeros(layout.n_local)
     columns: list[SupportColumn] = []
     problem = None
     x = continuum.positions()
-    for support in supports:
+    for support in plain:
         group = continuum.owned_nodes(support.where).astype(np.int64)
         owner = f"{type(support).__name__}('{support.title}')"
         for axis, unknown, wanted in _prescribed(continuum, support, group):
@@ -181,12 +196,61 @@ def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Su
                 )
             moves = low != 0.0 or high != 0.0
             scale = high if moves and low == high else 1.0
-            columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale))
+            largest = max(abs(low), abs(high))
+            columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale, largest))
     raise_on_all_ranks(continuum.comm, problem)
+    _share_at_joints(layout, which, value, columns)
     for i, column in enumerate(columns):
         # a component that stays zero keeps a column of ones, which gives its reaction
         value[which == i] = 1.0 if not column.moves else value[which == i] / column.scale
-    return Supports(tuple(columns), which, value)
+    moves = np.array([column.moves for column in columns], dtype=bool)
+    titles = [column.title for column in columns]
+    following, motions = collect_following(continuum, constraints, which, value, moves, titles)
+    for motion in motions:
+        moved = motion.value != 0.0
+        columns.append(
+            SupportColumn(motion.title, motion.constraint, moved, motion.value if moved else 1.0)
+        )
+    return Supports(tuple(columns), which, value, following, len(motions), tuple(constraints))
+
+
+def _share_at_joints(
+    layout: DofLayout, which: Ints, value: Array, columns: Sequence[SupportColumn]
+) -> None:
+    """Prescribe the displacement of all nodes of a joint as that of one is, in place; collective.
+
+    Raises:
+        InterfaceError: Supports prescribe different displacements of them.
+    """
+    joints = layout.joints
+    if not len(joints.nodes):
+        return
+    nodes = InterfaceNodes(layout, joints.nodes)
+    dofs = layout.dof(nodes.local[:, None], np.arange(layout.gdim))
+    at = nodes.find(joints.nodes)
+    column, wanted = nodes.share(which[dofs])[at], nodes.share(value[dofs])[at]
+    for rows in joints.groups():
+        for c in range(layout.gdim):
+            held = rows[column[rows, c] >= 0]
+            if not len(held):
+                continue
+            first = held[0]
+            one = columns[column[first, c]]
+            for r in held[1:]:
+                other = columns[column[r, c]]
+                if wanted[r, c] != wanted[first, c] or (
+                    wanted[r, c] != 0.0 and other.support.amplitude != one.support.amplitude
+                ):
+                    raise InterfaceError(
+                        f"supports '{one.title}' and '{other.title}' prescribe different "
+                        "displacements of nodes at which shells meet; let only one of them hold "
+                        "the joint"
+                    )
+            free = np.setdiff1d(rows, held)
+            column[free, c], wanted[free, c] = column[first, c], wanted[first, c]
+    mine = layout.is_owned(joints.nodes)
+    dofs = layout.dof(layout.to_local(joints.nodes[mine])[:, None], np.arange(layout.gdim))
+    which[dofs], value[dofs] = column[mine], wanted[mine]
 
 
 def warn_of_held_bonds(pair: Pair, held: npt.NDArray[np.bool_]) -> None:
@@ -309,11 +373,16 @@ def _with_normal(frame: Array, normal: Array) -> Array:
 
 
 def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -> bool:
-    """Whether two prescribed dofs always have the same displacement."""
+    """Whether two prescribed dofs always have the same displacement, but for round-off.
+
+    A function of position gives values at nodes whose coordinates differ by round-off; where it
+    passes through zero they are equal only beside its largest value.
+    """
     one, other = (c.scale * at if c.moves else 0.0 for c, at in ((a, at_a), (b, at_b)))
-    if one == other == 0.0:
+    round_off = 1e-12 * max(a.largest, b.largest, abs(one))
+    if max(abs(one), abs(other)) <= round_off:
         return True
-    return a.support.amplitude == b.support.amplitude and abs(one - other) <= 1e-12 * abs(one)
+    return a.support.amplitude == b.support.amplitude and abs(one - other) <= round_off
 
 
 def check_slaves(
@@ -352,7 +421,9 @@ def check_slaves(
                 raise InterfaceError(
                     f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
                     f"'{seen[dof]}' and of '{pair.title}'; a node can be a slave only once: "
-                    "let the surfaces end before each other or exchange slave and master of one"
+                    "where surfaces meet at an angle, exchange slave and master of one; those that "
+                    "continue each other are one interface: mesh.joined('whole', ['first', "
+                    "'second']) for either side, with toughness and friction by position"
                 )
             seen[dof] = pair.title
         slave = nodes.find(pair.surface.dofs)

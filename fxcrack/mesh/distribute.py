@@ -11,12 +11,16 @@ from dolfinx.mesh import Mesh as Domain
 from mpi4py import MPI
 
 from fxcrack.base.errors import MeshError
+from fxcrack.mesh.kinks import part_at_kinks
 from fxcrack.mesh.mesh import Group, Mesh
 from fxcrack.mesh.raw import RawMesh, distinct, vertices_of
 
 
 def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
     """Make the distributed mesh; collective.
+
+    Surfaces in space get nodes of their own for each smooth part where they have kinks or T joints
+    (:mod:`fxcrack.mesh.kinks`).
 
     Args:
         raw: The whole mesh on rank 0, ``None`` on the others.
@@ -26,8 +30,11 @@ def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
     Raises:
         MeshError: A group holds entities that are not facets, edges or nodes of the cells.
     """
-    shape = None
+    shape = joints = None
     if raw is not None:
+        if (raw.tdim, raw.gdim) == (2, 3):
+            raw = part_at_kinks(raw)
+        joints = raw.joints
         shape = (raw.cell, raw.order, raw.tdim, raw.gdim, raw.n_entity_nodes(raw.tdim))
     cell, order, tdim, gdim, width = comm.bcast(shape)
     points = np.empty((0, gdim)) if raw is None else raw.points
@@ -42,7 +49,7 @@ def distribute(raw: RawMesh | None, comm: MPI.Comm, name: str) -> Mesh:
             groups[group] = Group(dim, entities)
     for group, points in _midside_groups(raw, domain).items():
         groups[group] = replace(groups[group], points=points)
-    return Mesh(domain, groups, name)
+    return Mesh(domain, groups, name, comm.bcast(joints))
 
 
 def _midside_groups(raw: RawMesh | None, domain: Domain) -> dict[str, npt.NDArray[np.int32]]:

@@ -53,6 +53,8 @@ class RawMesh:
         cells: Nodes of each cell in DOLFINx order, shape (n_cells, n_cell_nodes).
         cell_groups: Indices of the cells of each named group of cells.
         groups: Named groups of facets, edges and nodes.
+        joints: Nodes that smooth parts of a surface have of their own where they meet, and the
+            number of their joint, sorted by it, shape (n_nodes, 2).
     """
 
     cell: str
@@ -61,6 +63,7 @@ class RawMesh:
     cells: Ints
     cell_groups: dict[str, Ints] = field(default_factory=dict)
     groups: dict[str, RawGroup] = field(default_factory=dict)
+    joints: Ints = field(default_factory=lambda: np.zeros((0, 2), dtype=np.int64))
 
     @property
     def tdim(self) -> int:

@@ -115,7 +115,7 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
     moves = np.zeros_like(corners.pair, dtype=bool)
     on = corners.pair >= 0
     moves[on] = np.isin(corners.piece[corners.pair[on]], np.setdiff1d(slave_pieces, master_pieces))
-    moves &= moves[:, : raw.n_vertices(raw.tdim)] @ _vertices_of_nodes(raw)
+    moves &= moves[:, : raw.n_vertices(raw.tdim)] @ vertices_of_nodes(raw)
     if not moves.any():
         raise MeshError(
             f"splitting along '{split.surface}' separates nothing: all its corner nodes are on its "
@@ -129,7 +129,7 @@ def split_surface(raw: RawMesh, split: Split) -> RawMesh:
     cells[corners.cells] = renamed
 
     groups = {
-        name: RawGroup(group.dim, _images(raw, group, corners.nodes, renamed))
+        name: RawGroup(group.dim, images(raw, group, corners.nodes, renamed))
         for name, group in raw.groups.items()
         if name != split.surface
     }
@@ -230,7 +230,7 @@ def _facet_nodes(raw: RawMesh) -> Ints:
     return np.array(reference(raw.cell, raw.order).entity_closure_dofs[raw.tdim - 1])
 
 
-def _vertices_of_nodes(raw: RawMesh) -> npt.NDArray[np.bool_]:
+def vertices_of_nodes(raw: RawMesh) -> npt.NDArray[np.bool_]:
     """Which vertices span the part of the cell a node belongs to, shape (n_vertices, n_nodes).
 
     DOLFINx knows edges and facets by their vertices: a midside node can be doubled only together
@@ -402,7 +402,7 @@ def _components(n: int, links: Ints) -> tuple[int, Ints]:
     return int(count), labels.astype(np.int64)
 
 
-def _images(raw: RawMesh, group: RawGroup, nodes: Ints, renamed: Ints) -> Ints:
+def images(raw: RawMesh, group: RawGroup, nodes: Ints, renamed: Ints) -> Ints:
     """What the entities of a group become: the distinct images in the cells that hold them.
 
     Args:

@@ -125,7 +125,11 @@ def _explicit(analysis: Analysis, solver: ExplicitSolver) -> Explanation:
     per = sum(costs.values()) / max(solver.increments, 1)
     notes = [
         f"increment: {solver.dt:.6g}, of the largest stable one {solver.stable:.6g}, which the "
-        "highest frequency of the bodies limits (bonds and contact do not)",
+        + (
+            "highest frequency of bodies and elastic bonds limits (contact does not)"
+            if solver.dynamics.elastic.exist
+            else "highest frequency of the bodies limits (bonds and contact do not)"
+        ),
         f"operator: {choice.name}, {choice.why}",
         f"interface: {'one master for each slave' if lumped.simple else 'slaves share masters'}",
         f"seconds per increment: {per:.3g}, of which internal forces "

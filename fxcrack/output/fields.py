@@ -24,6 +24,7 @@ from fxcrack.interface.pairing import Pair
 from fxcrack.output.interface_fields import InterfaceFields, in_space, interface_fields
 from fxcrack.output.shell_fields import shell_grid
 from fxcrack.output.vtu import FACETS, Grid, write_grid, write_header, write_series
+from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
@@ -63,8 +64,11 @@ def stress_function(source: Analysis | HasAnalysis, u: fem.Function, time: float
             "a shell has no one stress over its thickness: write_fields() gives the stresses on "
             "both faces and the section forces, fxcrack.continuum.shell_stress the same as arrays"
         )
-    if isinstance(analysis.solver, NewtonSolver):
-        return analysis.solver.bodies.stress()
+    solver = analysis.solver
+    if isinstance(solver, NewtonSolver):
+        return solver.bodies.stress()
+    if isinstance(solver, ExplicitSolver) and not solver.bodies.linear:
+        return solver.bodies.stress()
     continuum = analysis.continuum
     if continuum.temperature is not None:
         continuum.temperature.set(time)
@@ -83,6 +87,8 @@ def body_grid(analysis: Analysis, u: fem.Function, time: float) -> Grid:
     """This rank's cells with displacement, stress and von Mises stress; collective."""
     continuum = analysis.continuum
     if isinstance(continuum, ShellBodies):
+        if continuum.temperature is not None:
+            continuum.temperature.set(time)
         return shell_grid(continuum, u, finite=has_finite_bodies(analysis))
     stress = stress_function(analysis, u, time)
     equivalent = von_mises(continuum, stress)

@@ -222,6 +222,12 @@ class Solver(AnySolver, Protocol):
 
     # -- bonds ---------------------------------------------------------------------------
 
+    def displacement_of_jumps(self, jump: Array) -> PETSc.Vec:
+        """Change of displacement by a change of retained jumps, shape (n_retained,); collective.
+
+        Loads stay as they are; the caller destroys it.
+        """
+
     def release(self, p: int, nodes: Ints, force: Array) -> tuple[float, float]:
         """Release nodes at constant load and find the new equilibrium.
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from mpi4py import MPI
+from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.continuum import Continuum
@@ -15,6 +16,7 @@ from fxcrack.continuum.thermal_strain import ThermalLoad
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.solvers.base import Solver
+from fxcrack.solvers.cell_source import CellSource
 
 
 class CondensedBodies:
@@ -38,6 +40,8 @@ class CondensedBodies:
         continuum, forms = self.continuum, self._forms
         if isinstance(continuum, ShellBodies) or continuum.shell_cells:
             return "shells"
+        if continuum.founded:
+            return "stabilise"
         if forms is None:
             return ""
         if forms.dynamic:
@@ -48,10 +52,22 @@ class CondensedBodies:
             return "pressures that follow the bodies"
         return ""
 
+    def cells_around(self, groups: list[str | None]) -> CellSource:
+        """The cells, with marks of those of some groups; collective."""
+        return CellSource(self.continuum, groups)
+
     def displacements(self, nodes: Ints, state: Equilibrium) -> Array:
         """Displacements of global nodes, the same on all ranks; collective."""
+        return self._of_nodes(nodes, self._solver.displacement(state))
+
+    def changes(self, nodes: Ints, before: Equilibrium, after: Equilibrium) -> Array:
+        """Change of displacements between states of the same loads; collective."""
+        change = self._solver.displacement_of_jumps(after.jump - before.jump)
+        return self._of_nodes(nodes, change)
+
+    def _of_nodes(self, nodes: Ints, u: PETSc.Vec) -> Array:
+        """Values of a vector at global nodes, on all ranks, shape (n, gdim); destroys it."""
         layout = self.continuum.layout
-        u = self._solver.displacement(state)
         here = layout.is_owned(nodes)
         mine = np.zeros((len(nodes), self.continuum.gdim))
         mine[here] = layout.displacements(u.array_r)[layout.to_local(nodes[here])]

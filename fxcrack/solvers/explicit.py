@@ -29,6 +29,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.sparse import add_multiple
 from fxcrack.base.timings import Timings
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.continuum.loads import Load, Monitor
@@ -42,23 +43,19 @@ from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair, local_frames
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_bodies import BodyMotion
+from fxcrack.solvers.explicit_elastic import ElasticBonds
 from fxcrack.solvers.explicit_energies import MotionEnergies, stored_energies, sums_over_ranks
+from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
+from fxcrack.solvers.explicit_present import PresentInterface
 from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
+from fxcrack.solvers.explicit_stability import Stability
 from fxcrack.solvers.explicit_state import Arrays, InterfaceSnapshot, MotionFiles, MotionSnapshot
 from fxcrack.solvers.explicit_supports import PrescribedMotion
 from fxcrack.solvers.options import ExplicitOptions
-from fxcrack.solvers.stable_increment import (
-    HighestFrequency,
-    chosen_increment,
-    rounded_down,
-    start_vector,
-)
-
-_AGAIN = 6
-"""Lanczos steps that follow a tangent which has changed little."""
+from fxcrack.solvers.stable_increment import chosen_increment
 
 
 class ExplicitSolver:
@@ -83,6 +80,8 @@ class ExplicitSolver:
         energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
         dynamics: Motion and forces of the interfaces.
+        stability: The stable increment.
+        further: Pressures that follow the bodies, bulk viscosity.
         dt: Increment, time.
         stable: Largest stable increment, time.
         at: Time of the displacement.
@@ -109,10 +108,15 @@ class ExplicitSolver:
         self.n_loads = len(supports.columns) + len(loads)
         self.active = [False] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
-        self.bodies = InternalForces(continuum, terms)
+        following = [t for t in terms if isinstance(t, FollowerPressure)]
+        self.bodies = InternalForces(continuum, [t for t in terms if t not in following])
+        self._effect = effect
+        self.further = FurtherForces(continuum, following, self.bodies.u)
+        self._further: Array | None = None
         self.mass = ScaledMass(lumped_mass(continuum, effect))
         self._velocity = starting_velocity(continuum, effect.velocity)
         self._velocity_whole = True  # at interface nodes as well
+        self._loads_before: Array | None = None
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
@@ -127,8 +131,10 @@ class ExplicitSolver:
         chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
         self.motion = BodyMotion(self.bodies, chosen)
-        self._now: Array | None = None  # coordinates of the present increment
-        self._files = MotionFiles(continuum)
+        # coordinates at the start of the present increment and at its end
+        self._now: Array | None = None
+        self._then = np.zeros(self.n_loads)
+        self._files = MotionFiles(continuum, self.bodies)
         zero = np.zeros(self.lumped.n_rows * continuum.gdim)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
 
@@ -145,18 +151,20 @@ class ExplicitSolver:
         for rows, held in zip(self.row_of, self.held_by_supports, strict=True):
             numbers = gdim * rows[:, None] + np.arange(gdim)
             self.index.append(np.where((rows >= 0)[:, None] & ~held, numbers, -1))
-        tied = np.zeros(lumped.n_rows, dtype=bool)
+        bonded = np.zeros(lumped.n_rows, dtype=bool)
         for front, rows in zip(self.fronts, self.row_of, strict=True):
             has = rows >= 0
-            tied[rows[has]] = front.bonded[has]
-        self.dynamics = InterfaceDynamics(lumped, self.pairs, tied)
+            bonded[rows[has]] = front.bonded[has]
+        elastic = ElasticBonds(lumped, self.pairs, self.continuum)
+        sprung = np.any(elastic.local > 0.0, axis=1)
+        elastic.active = bonded & sprung
+        self._has_elastic = bool(sprung.any())
+        self.dynamics = InterfaceDynamics(lumped, self.pairs, bonded & ~sprung, elastic)
         self._mine = nodes.mine
         self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
-        self._bonds = np.zeros((lumped.n_rows + 1, gdim))
-        self._jumps = np.zeros((lumped.n_rows + 1, gdim))
+        self._present = PresentInterface(lumped, self.dynamics)
+        self.stability = Stability(self.bodies, self.dynamics, self.further, self._at_interface)
         self._at_nodes = np.zeros(gdim * len(nodes))
-        self._bonds_known = False
-        self._any_held = bool(lumped.held.any())
         self._has_face_loads = self._outer.take_faces(lumped)
         self.dynamics.v = nodes.gather(self._velocity)
 
@@ -188,7 +196,8 @@ class ExplicitSolver:
         start = clock.perf_counter()
         if self.mass.choose(options, self.bodies):
             self._take_mass()
-        self.stable = self._stable_increment()
+        self.energies.is_viscous |= self.stability.take_viscosity(options, self._effect)
+        self.stable = self.stability.find(self.mass.values, self.velocity)
         self.motion.prepare(self.mass.inverse)
         self._outer.divide(self._chosen, self.mass.inverse)
         self.dt = chosen_increment(options, self.stable)
@@ -202,12 +211,6 @@ class ExplicitSolver:
         lumped = self.lumped
         lumped.mass = lumped.nodes.gather(self.mass.values)[:, 0]
         self.dynamics.set_ties(lumped.tied)
-
-    def _stable_increment(self) -> float:
-        places = self.continuum.positions()[: self.continuum.layout.n_owned]
-        start = start_vector(places, self.continuum.gdim)
-        self._highest = HighestFrequency(self.comm, self.mass.values, start)
-        return rounded_down(2.0 / self._highest(self.bodies.tangent_product))
 
     def follow_bodies(self) -> None:
         """Take front geometry and contact normals of bodies that move far; collective."""
@@ -224,7 +227,7 @@ class ExplicitSolver:
 
     def renew_stable_increment(self) -> float:
         """The stable increment with the present tangent, by a few more steps; collective."""
-        self.stable = rounded_down(2.0 / self._highest(self.bodies.tangent_product, _AGAIN))
+        self.stable = self.stability.again(self.velocity)
         return self.stable
 
     def set_displacement(self, owned: Array) -> None:
@@ -241,6 +244,9 @@ class ExplicitSolver:
         self.bodies.u.x.scatter_forward()
         self.dynamics.u = self.lumped.nodes.gather(u[: self.continuum.n_local])
         self.lumped.follow(self.dynamics.v)
+        self._loads = coordinates[len(self.supports.columns) :]
+        self.bodies.begin(self.at)
+        self.energies.heated = self._thermal_part()
         self.energies.initial = sum(self.stored_now().values())
 
     # -- one increment -------------------------------------------------------------------
@@ -255,13 +261,19 @@ class ExplicitSolver:
         t0 = clock.perf_counter()
         columns = len(self.supports.columns)
         self._h = 0.5 * (self.last_dt + self.dt)
-        self._now, self._loads, self._coordinates = now, now[columns:], then[:columns]
+        self._now, self._then = now, then
+        self._loads, self._coordinates = now[columns:], then[:columns]
         chosen = self._at_chosen
+        self.bodies.begin(self.at)
         self.motion.forces(chosen, self._h)
+        self.bodies.commit()
         np.negative(chosen, out=chosen)
         if self.dt != self.last_dt:
             self._internal = self.motion.whole()
         self._outer.add_at_chosen(chosen, self._loads)
+        if self.further.exist:
+            self._further = self.further.find(self.at, self.velocity)
+            chosen += self._further[self._chosen]
         if self._damping:
             at = self._chosen
             chosen -= self._damping * self.mass.values[at] * self.velocity[at]
@@ -279,48 +291,26 @@ class ExplicitSolver:
     def accelerate(self) -> None:
         """Motion of the interface nodes and the forces between them, with the present ties."""
         self.dynamics.accelerate(self._at_nodes, self._coordinates, self._h, self.dt)
-        self._bonds_known = False
+        self._present.forget()
 
     @property
     def bonds(self) -> Array:
         """Forces of the tied bonds on the slaves, shape (n_rows + 1, gdim), force."""
-        self._know_bonds()
-        return self._bonds
+        return self._present.bonds
 
     @property
     def jumps(self) -> Array:
         """Jumps of the open rows, shape (n_rows + 1, gdim), length."""
-        self._know_bonds()
-        return self._jumps
+        return self._present.jumps
 
     @property
     def face_loads(self) -> Array | None:
         """Loads on the slave side, shape (n_rows + 1, gdim), force; ``None``: there are none."""
         if not self._has_face_loads:
             return None
-        out = np.zeros_like(self._bonds)
+        out = np.zeros_like(self._present.jumps)
         out[:-1] = self._outer.on_faces(self._loads)
         return out
-
-    def _know_bonds(self) -> None:
-        """Find bond forces and jumps of all rows in the present increment."""
-        if self._bonds_known:
-            return
-        dynamics, lumped = self.dynamics, self.lumped
-        rows, forces = lumped.bond_forces(dynamics.a, dynamics.total)
-        if self._any_held:
-            forces = self._without_supports(rows, forces)
-        self._bonds[lumped.open] = 0.0
-        self._bonds[rows] = forces
-        self._jumps[lumped.open] = dynamics.gap
-        self._bonds_known = True
-
-    def _without_supports(self, rows: Ints, forces: Array) -> Array:
-        """Bond forces without the components that supports hold, which are their reactions."""
-        frames = self.lumped.frames[rows]
-        local = np.einsum("nci,nc->ni", frames, forces)
-        local[self.lumped.held[rows]] = 0.0
-        return np.asarray(np.einsum("nci,ni->nc", frames, local))
 
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
@@ -331,14 +321,20 @@ class ExplicitSolver:
         reactions = self._reactions_to(given)
         at, mine = self._at_interface, self._mine
         # loads, damping and changes of the increment look at all dofs
+        further = self._further if self.further.exist else None
         whole = bool(self.loads) or self._damping > 0.0 or dt != self.last_dt
+        whole |= further is not None
         v = self.velocity if whole else self._velocity
         before = v.copy() if whole else v
         old = prescribed.motion(v, dynamics.v)
+        if dynamics.elastic.exist and dt != self.last_dt:
+            self._interface_before, self._jumps_before = dynamics.v.copy(), dynamics.gap
         if self._damping:
             v *= 1.0 - h * self._damping
         self.motion.add_change(v)
         self._outer.add_elsewhere(v, self._loads, h)
+        if further is not None:
+            v += h * self.mass.inverse * further
         dynamics.advance(h, dt)
         v[prescribed.dofs] = given
         if whole and len(at):
@@ -347,6 +343,8 @@ class ExplicitSolver:
         if self.loads:
             power += self._outer.power(self._loads, before)
             power += self._outer.power(self._loads, v)
+        if further is not None:
+            power += energies.take_further(self.further, before + v, h)
         energies.work += 0.5 * h * power
         if self._damping:
             rate = 0.5 * h * self._damping
@@ -355,11 +353,12 @@ class ExplicitSolver:
             # U of linear bodies is u^n . f_int(u^{n+1})/2: it changes with the length of increments
             more = 0.25 * (dt - self.last_dt) * float(self._internal @ (v - before))
             more = sums_over_ranks(self.comm, more)[0]
+            more += self._of_elastic_bonds(dt)
             if self.increments:
                 energies.renewed -= more
             else:
                 energies.initial += more
-        self._velocity_whole = whole
+        self._velocity_whole, self._loads_before = whole, self._loads
         add_multiple(u, dt, v)
         if len(at):
             u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
@@ -368,8 +367,17 @@ class ExplicitSolver:
         self.at += dt
         self.last_dt = dt
         self.increments += 1
-        self._bonds_known = False
+        self._present.forget()
         self.seconds["update"] += clock.perf_counter() - start
+
+    def _of_elastic_bonds(self, dt: float) -> float:
+        """What a change of the increment does to the energy of elastic bonds."""
+        dynamics = self.dynamics
+        if not dynamics.elastic.exist:
+            return 0.0
+        change = dynamics.v - self._interface_before
+        pull = dynamics.elastic.forces(self._jumps_before)
+        return -0.25 * (dt - self.last_dt) * float(np.vdot(pull, self.lumped.jumps(change)))
 
     def reactions(self) -> Array:
         """Reactions of the prescribed dofs of this rank, in the order of :attr:`prescribed`.
@@ -398,7 +406,23 @@ class ExplicitSolver:
         """
         out = stored_energies(self.bodies, self.motion, self.mass, self.velocity, self.last_dt)
         out["kinetic_energy"] += self.lumped.excess_energy(self.dynamics.v)
+        out["strain_energy"] -= self._thermal_part()
+        if self._has_elastic:
+            out["bond_energy"] = self.dynamics.stored()
         return out
+
+    def _thermal_part(self) -> float:
+        """What the temperature of linear bodies takes off 1/2 u K u to give what is stored.
+
+        In the middle of the last increment; collective.
+        """
+        if not self._outer.n_thermal:
+            return 0.0
+        before = self._loads if self._loads_before is None else self._loads_before
+        n = self.continuum.n_local
+        u = self.bodies.u.x.array[:n] - 0.5 * self.last_dt * self.velocity
+        answers = sums_over_ranks(self.comm, *self._outer.conjugates(u))
+        return self._outer.thermal_part(0.5 * (before + self._loads), np.array(answers))
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies, by name, of the present state; collective."""
@@ -418,11 +442,17 @@ class ExplicitSolver:
             out["dt_energy"] = self.energies.renewed
         if self._damping:
             out["damping_energy"] = self.energies.totals()[1]
-        return out
+        if self.energies.is_viscous:
+            out["viscous_energy"] = self.energies.totals()[2]
+        return out | self.bodies.spent()
 
     def external_work(self) -> float:
-        """Work of supports and loads up to the middle of the last increment; collective."""
-        return self.energies.totals()[0]
+        """Work of supports, loads and temperature up to the middle of the last increment.
+
+        Collective.
+        """
+        heat = self.energies.heated - self._thermal_part()
+        return self.energies.totals()[0] + heat + self.bodies.work()
 
     # -- going back, and checkpoints -----------------------------------------------------
 
@@ -433,6 +463,7 @@ class ExplicitSolver:
             self.bodies.u.x.array[:n].copy(), self.velocity.copy(),
             InterfaceSnapshot.of(self.dynamics), self.at, self.last_dt,
             self.energies.totals(), self.increments,
+            None if self._now is None else (self._now, self._then), self.bodies.state(),
         )  # fmt: skip
 
     def recall(self, saved: MotionSnapshot) -> None:
@@ -446,9 +477,10 @@ class ExplicitSolver:
         self.dynamics.u = self.lumped.nodes.gather(x.array[:n])
         self.dynamics.v = self.lumped.nodes.gather(self.velocity)
         saved.interfaces.restore(self.dynamics)
-        if self._now is not None:
-            columns = len(self.supports.columns)
-            self.begin(self._now, np.append(self._coordinates, self._now[columns:]))
+        self.bodies.restore(saved.bodies)
+        self._loads_before = None
+        if saved.coordinates is not None:
+            self.begin(*saved.coordinates)
 
     def collect(self) -> Arrays:
         """The state at the start of this increment as plain arrays; collective.

@@ -48,6 +48,8 @@ class SofteningBonds:
         final: w_f, length.
         low: Opening in the middle of the last increment, length.
         top: Largest one so far, length.
+        origin: Jump along the direction from which openings count, length: that at debonding of a
+            bond with a stiffness of its own, else 0.
         direction: Direction of the opening, shape (n_rows, gdim).
         spent: Energy the bond has taken, force times length.
         area: Area that its release sweeps, length^2; 0 before.
@@ -59,6 +61,7 @@ class SofteningBonds:
     final: Array
     low: Array
     top: Array
+    origin: Array
     direction: Array
     spent: Array
     area: Array
@@ -73,6 +76,7 @@ class SofteningBonds:
             final=np.zeros(n),
             low=np.zeros(n),
             top=np.zeros(n),
+            origin=np.zeros(n),
             direction=np.zeros((n, gdim)),
             spent=np.zeros(n),
             area=np.zeros(n),

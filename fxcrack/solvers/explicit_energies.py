@@ -3,7 +3,8 @@
     T = 1/2 v . M v,    U = 1/2 u^n . f_int(u^{n+1})
 
 of linear bodies; of nonlinear ones U is the mean of the energies stored at both ends, less
-dt/4 v . (f_int(u^{n+1}) - f_int(u^n)).
+dt/4 v . (f_int(u^{n+1}) - f_int(u^n)). Where energies depend on the states passed, only those of
+the end can be told: U is what is stored there, less dt/2 v . f_int(u^{n+1}).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from mpi4py import MPI
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.solvers.explicit_bodies import BodyMotion
+from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_mass import ScaledMass
 
 
@@ -25,8 +27,11 @@ def sums_over_ranks(comm: MPI.Intracomm, *parts: float) -> list[float]:
     return [float(x) for x in values]
 
 
+Totals = tuple[float, float, float, float, float, float]
+
+
 class MotionEnergies:
-    """Energies that went in and out so far; every rank holds its part of the first two.
+    """Energies that went in and out so far; every rank holds its part of the first three.
 
     Args:
         comm: Communicator of the bodies.
@@ -34,25 +39,42 @@ class MotionEnergies:
     Attributes:
         work: Of supports and loads.
         damped: Dissipated by damping.
+        viscous: Dissipated by bulk viscosity.
+        is_viscous: Whether there is or was any.
         initial: Stored at the start, that of all ranks.
         renewed: Gone with changes of the increment, that of all ranks: energies belong to the
             middle of increments, which a change of dt moves.
+        heated: What the temperature of linear bodies took off 1/2 u K u at the start.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = comm
-        self.work = self.damped = self.initial = self.renewed = 0.0
+        self.work = self.damped = self.viscous = self.initial = self.renewed = self.heated = 0.0
+        self.is_viscous = False
 
-    def totals(self) -> tuple[float, float, float, float]:
-        """Work, damping, energy at the start and gone with changes of dt; collective."""
-        work, damped = sums_over_ranks(self._comm, self.work, self.damped)
-        return work, damped, self.initial, self.renewed
+    def take_further(self, forces: FurtherForces, motion: Array, h: float) -> float:
+        """Count what bulk viscosity dissipates; the power of pressures, of this rank.
 
-    def restore(self, totals: tuple[float, float, float, float]) -> None:
+        Args:
+            forces: Forces of the increment.
+            motion: Sum of the velocities before and after, owned dofs, shape (n_local,).
+            h: Time between both.
+        """
+        if forces.viscous is not None:
+            self.viscous -= 0.5 * h * float(forces.viscous @ motion)
+        return 0.0 if forces.pressures is None else float(forces.pressures @ motion)
+
+    def totals(self) -> Totals:
+        """Work, damping, viscosity, energy at the start, gone with dt, of heat; collective."""
+        work, damped, viscous = sums_over_ranks(self._comm, self.work, self.damped, self.viscous)
+        return work, damped, viscous, self.initial, self.renewed, self.heated
+
+    def restore(self, totals: Totals) -> None:
         """Take what :meth:`totals` gave."""
         mine = float(self._comm.rank == 0)
-        self.work, self.damped = mine * totals[0], mine * totals[1]
-        self.initial, self.renewed = totals[2:]
+        self.work, self.damped, self.viscous = (mine * x for x in totals[:3])
+        self.initial, self.renewed, self.heated = totals[3:]
+        self.is_viscous |= totals[2] != 0.0
 
 
 def stored_energies(
@@ -77,7 +99,9 @@ def stored_energies(
         strain = 0.0
         force = bodies.forces().copy()
         energy = bodies.stored()
-        if dt > 0.0:
+        if dt > 0.0 and bodies.path_dependent:
+            strain = -0.5 * dt * float(force @ velocity)
+        elif dt > 0.0:
             bodies.u.x.array[:n] = now - dt * velocity
             bodies.u.x.scatter_forward()
             energy = 0.5 * (energy + bodies.stored())

@@ -18,7 +18,7 @@ overlap afterwards are all open pairs looked at (:meth:`InterfaceDynamics._gener
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,7 +28,19 @@ from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
-from fxcrack.solvers.explicit_softening import SWEEPS, LiveBonds, settled
+from fxcrack.solvers.explicit_elastic import ElasticBonds
+from fxcrack.solvers.explicit_faces import (
+    SWEEPS,
+    FaceForces,
+    OpenFaces,
+    find_forces,
+    total_forces,
+    without_gain,
+)
+from fxcrack.solvers.explicit_softening import LiveBonds
+
+_LEFT = 1e-6
+"""Energy left to an elastic bond over that it had stored, below which it is free at once."""
 
 
 @dataclass
@@ -72,12 +84,15 @@ class ChosenBonds:
     """Bond forces of some tied rows, as long as ties stay as they are.
 
     Attributes:
-        by_forces: From the forces on the nodes, (n gdim, n_nodes gdim).
+        by_forces: From the forces on the nodes, (n gdim, n_nodes gdim); of elastic bonds jumps from
+            their displacements.
         by_motion: From the accelerations that supports prescribe at nodes, (n gdim, n_prescribed).
+        stiffness: Of elastic bonds, shape (n, gdim, gdim), force/length.
     """
 
     by_forces: Product
     by_motion: Product | None
+    stiffness: Array | None = None
 
 
 class InterfaceDynamics:
@@ -87,6 +102,7 @@ class InterfaceDynamics:
         lumped: Masses and weights.
         pairs: Interfaces.
         tied: Rows that are tied at the beginning, shape (n_rows,).
+        elastic: Bonds with a stiffness of their own; their rows are open.
 
     Attributes:
         fading: Bond forces that fall with time.
@@ -94,9 +110,11 @@ class InterfaceDynamics:
         penalty: Stiffness of contact over m/dt^2 of the pair; ``None``: by multipliers.
     """
 
-    def __init__(self, lumped: LumpedInterface, pairs: Sequence[Pair], tied: Bools) -> None:
+    def __init__(
+        self, lumped: LumpedInterface, pairs: Sequence[Pair], tied: Bools, elastic: ElasticBonds
+    ) -> None:
         gdim = lumped.frames.shape[-1]
-        self.lumped = lumped
+        self.lumped, self.elastic = lumped, elastic
         self._shape = len(lumped.nodes), gdim
         n = len(lumped.nodes) * gdim
         # displacement and velocity, those of the end of the increment, and work space
@@ -119,6 +137,7 @@ class InterfaceDynamics:
         self._fixed_column = lumped.which.ravel()[self._fixed]
         self._fixed_value = lumped.value.ravel()[self._fixed]
         self._h = self._dt = 1.0
+        self._warned_of_sweeps = False
         self._acting = _Acting()
         self.set_ties(tied)
 
@@ -191,19 +210,23 @@ class InterfaceDynamics:
         """Take the frames of the rows, which have turned, and prepare what depends on them."""
         lumped = self.lumped
         rows = lumped.open
+        self.elastic.renew()
         self._normal = lumped.frames[rows][:, :, 0]
         self._compliance = np.einsum("nc,nc->n", lumped.compliance, self._normal**2)
         scale = self._compliance.max(initial=0.0)
         # prescribed on all sides along the normal: no force could keep such a pair apart
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
+        may_touch &= ~self.elastic.active[rows]
         self._may_touch = np.flatnonzero(may_touch)
         self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
-        self._gap = lumped.gap[rows] if np.any(lumped.gap[rows]) else None
+        self._has_gap = bool(np.any(lumped.gap[rows]))
         self._closing_gap = lumped.gap[rows[self._may_touch]]
         self._gaps = np.zeros(len(self._may_touch))
-        self._mu = self._friction[rows]
-        self._rough = bool(self._mu.any())
-        self._warned_of_sweeps = False
+        self._faces = OpenFaces(
+            self._normal, lumped.gap[rows] if self._has_gap else None, self._may_touch,
+            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.simple,
+        )  # fmt: skip
+        self._last_found: FaceForces | None = None
         self._soften()
 
     def _soften(self) -> None:
@@ -216,15 +239,43 @@ class InterfaceDynamics:
         self._place = place
         self._soft = place[self._live.rows]
 
-    def release(self, rows: Ints) -> None:
-        """Untie rows; what holds them afterwards is given by the methods below."""
+    def release(self, rows: Ints) -> Array:
+        """Untie rows; what holds them afterwards is given by the methods below.
+
+        Returns:
+            Energy that was stored in the bonds of the rows, shape (n,), force times length.
+        """
+        lost = np.zeros(len(rows))
+        if self.elastic.exist:
+            lost = self._stored_by_row()[rows]
+            self.energies.bonds += float(lost.sum())
+            held = self.elastic.active.copy()
+            held[rows] = False
+            self.elastic.hold(held)
         before = self.lumped.excess_energy(self.v)
         tied = self.lumped.tied.copy()
         tied[rows] = False
         self.set_ties(tied)
         self.energies.ties += before - self.lumped.excess_energy(self.v)
+        return lost
 
-    def soften(self, rows: Ints, force: Array, onset: Array, energy: Array, area: Array) -> None:
+    def _stored_by_row(self) -> Array:
+        """Energy of elastic bonds in the middle of the last increment, shape (n_rows,)."""
+        last = 2.0 * self._h - self._dt
+        now = self.lumped.jumps(self.u)
+        return self.elastic.energies(now - last * self.lumped.jumps(self.v), now)
+
+    def stored(self) -> float:
+        """Energy of elastic bonds in the middle of the last increment, force times length."""
+        return float(self._stored_by_row().sum()) if self.elastic.exist else 0.0
+
+    def elastic_forces(self) -> Array:
+        """Forces of elastic bonds at the start of the increment, shape (n_nodes, gdim), force."""
+        return self.lumped.on_nodes(self.elastic.forces(self.gap))
+
+    def soften(
+        self, rows: Ints, force: Array, onset: Array, energy: Array, area: Array, lost: Array
+    ) -> None:
         """Let the bonds of rows that were released soften with their opening.
 
         Args:
@@ -233,15 +284,22 @@ class InterfaceDynamics:
             onset: Size of the force at which the law begins over the one at debonding, shape (n,).
             energy: What each bond is to spend, shape (n,), force times length.
             area: Area that the release of each sweeps, shape (n,), length^2.
+            lost: Part of the energy that was stored in the bond and is gone, shape (n,).
         """
         bonds, size = self._bonds, np.linalg.norm(force, axis=1)
-        some = size > 0.0
+        bonds.spent[rows], bonds.area[rows] = lost, area
+        energy = energy - lost
+        some = (size > 0.0) & (energy > _LEFT * lost)
+        bonds.freed[rows[~some]] = True
         rows, size, force = rows[some], size[some], force[some]
         bonds.direction[rows] = -force / size[:, None]
         bonds.strength[rows] = size * onset[some]
         bonds.final[rows] = 2.0 * energy[some] / bonds.strength[rows]
         bonds.low[rows] = bonds.top[rows] = 0.0
-        bonds.area[rows] = area[some]
+        if np.any(self.elastic.local[rows]):
+            motion = self.u - (self._h - 0.5 * self._dt) * self.v
+            at = self.lumped.jumps_along(rows, bonds.direction[rows])(motion.ravel())
+            bonds.origin[rows] = at
         bonds.active[rows] = True
         self._soften()
 
@@ -259,6 +317,8 @@ class InterfaceDynamics:
             dt: Increment, time.
         """
         lumped = self.lumped
+        if self.elastic.exist:
+            forces = forces + self.elastic_forces().ravel()
         self._forces, self._more, self._h, self._dt = forces, None, h, dt
         a = lumped.accelerations.into(forces, self._a)
         if len(self._fixed):
@@ -303,7 +363,7 @@ class InterfaceDynamics:
         if not len(self._may_touch):
             return False
         gaps = self._closing.into(x, self._gaps)
-        if self._gap is not None:
+        if self._has_gap:
             gaps += self._closing_gap
         return bool(gaps.min() < 0.0)
 
@@ -351,128 +411,51 @@ class InterfaceDynamics:
             free: Jumps at the end without these forces, shape (n_open, gdim), length.
             hh: dt h.
         """
-        soft, live, lumped = self._soft, self._live, self.lumped
-        strength = np.zeros(len(soft))
-        pressure = np.zeros(len(free))
-        holding: Array | None = None
+        soft, live, faces = self._soft, self._live, self._faces
         gap = self.gap
-        here = (gap[soft] * live.direction).sum(axis=1)
-        touch = self._may_touch[:0]
-        forces: Array | None = None
-        for sweep in range(SWEEPS):
-            there = free
-            if sweep and forces is not None:
-                there = free + hh * lumped.response(forces)
-            before, pressed, held = strength, pressure, holding
-            after = there
-            if len(soft):
-                own = hh * live.coupling.diagonal()
-                opening = (there[soft] * live.direction).sum(axis=1) + own * strength
-                strength = live.alone(here, opening, hh)
-                # what this changes at once at its own place; the rest follows in the next sweep
-                after = there.copy()
-                pull = (before - strength)[:, None] * live.direction
-                after[soft] += hh * lumped.compliance[soft] * pull
-            pressure, touch = self._pressures(after, pressure, hh)
-            if not len(soft) and not len(touch):
-                return None
-            forces = pressure[:, None] * self._normal
-            forces[soft] -= strength[:, None] * live.direction
-            rough = self._rough and bool(len(touch))
-            if rough:
-                moved = after + hh * lumped.compliance * (
-                    (pressure - pressed)[:, None] * self._normal
-                )
-                holding = self._sticking(moved - gap, holding, touch, pressure, hh)
-                forces += holding
-            elif holding is not None:
-                holding = np.zeros_like(holding)
-            if lumped.simple and not (len(soft) and pressure[soft].any()):
-                break  # every pair moves by itself, and softens or touches
-            if sweep and settled(strength, before) and settled(pressure, pressed):
-                if holding is None or held is None or settled(holding, held):
-                    break
-        else:
-            self._warn_of_sweeps()
-        assert forces is not None
+        found = find_forces(faces, live, soft, gap, free, hh, self._last_found)
+        if not faces.separate:
+            self._last_found = found
+        if not len(soft) and not len(found.touch):
+            return None
+        if not found.settled:
+            self._calm(found, gap, free)
         if len(soft):
-            acting.softening = strength
+            acting.softening = found.strength
+        touch = found.touch
         if len(touch):
-            acting.contact = touch, pressure[touch, None] * self._normal[touch]
-            if holding is not None:
-                acting.friction = touch, holding[touch]
-        return forces
+            acting.contact = touch, found.pressure[touch, None] * self._normal[touch]
+            if faces.rough:
+                acting.friction = touch, found.holding[touch]
+        return total_forces(faces, live, soft, found.strength, found.pressure, found.holding)
 
-    def _warn_of_sweeps(self) -> None:
-        """Say once that contact, friction and softening did not come to agree."""
+    def _calm(self, found: FaceForces, gap: Array, free: Array) -> None:
+        """Take of forces that do not agree a part that adds no energy, and say so once."""
+        faces, live, soft = self._faces, self._live, self._soft
+        none = np.zeros_like(found.pressure)
+        pulled = total_forces(faces, live, soft, found.strength, none, 0.0 * found.holding)
+        after = (free - gap) / self._dt + self._h * faces.response(pulled)
+        between = found.pressure[:, None] * faces.normal + found.holding
+        before = self.lumped.jumps(self.v)
+        part = without_gain(faces, between, before, after, self._h)
+        found.pressure, found.holding = part * found.pressure, part * found.holding
         if not self._warned_of_sweeps:
             self._warned_of_sweeps = True
             log.warn(
                 "explicit dynamics: forces between faces that touch did not settle in %d sweeps of "
-                "an increment; make the finer side the master, or give both sides the same mesh",
+                "an increment; of these forces the part is taken that adds no energy, %.3g",
                 SWEEPS,
+                part,
             )
-
-    def _pressures(self, jumps: Array, pressure: Array, hh: float) -> tuple[Array, Ints]:
-        """Contact forces for which touching pairs end at zero distance, and where there are any.
-
-        Args:
-            jumps: At the end of the increment with the present forces, shape (n_open, gdim).
-            pressure: Those forces, shape (n_open,), force.
-            hh: dt h.
-
-        Returns:
-            Pressures, shape (n_open,), and rows, shape (m,).
-        """
-        may = self._may_touch
-        if not len(may):
-            return pressure, may
-        gaps = self._normal_gaps(jumps)[may]
-        new = np.maximum(pressure[may] - gaps / (hh * self._compliance[may]), 0.0)
-        out = np.zeros(len(pressure))
-        out[may] = new
-        return out, may[new > 0.0]
-
-    def _normal_gaps(self, jumps: Array) -> Array:
-        gaps = (jumps * self._normal).sum(axis=1)
-        return np.asarray(gaps if self._gap is None else gaps + self._gap)
-
-    def _sticking(
-        self, moved: Array, before: Array | None, touch: Ints, pressure: Array, hh: float
-    ) -> Array:
-        """Friction of the touching pairs, shape (n_open, gdim), force.
-
-        Args:
-            moved: Change of the jumps over the increment with the present forces, those of friction
-                among them, shape (n_open, gdim), length.
-            before: The present forces of friction, same shape; ``None``: none.
-            touch: Rows that touch, shape (m,).
-            pressure: Of all open rows, shape (n_open,), force.
-            hh: dt h.
-        """
-        out = np.zeros_like(moved)
-        rough = touch[self._mu[touch] > 0.0]
-        if not len(rough):
-            return out
-        moved, n = moved[rough], self._normal[rough]
-        slide = moved - (moved * n).sum(axis=1)[:, None] * n
-        # masses that differ by component: the lightest one decides
-        holding = -slide / (hh * self.lumped.compliance[rough].max(axis=1))[:, None]
-        if before is not None:
-            holding += before[rough]
-        size = np.linalg.norm(holding, axis=1)
-        limit = self._mu[rough] * pressure[rough]
-        holding *= np.divide(limit, size, out=np.ones_like(size), where=size > limit)[:, None]
-        out[rough] = holding
-        return out
 
     def _by_penalty(self, acting: _Acting, free: Array, hh: float) -> Array | None:
         """Softening forces, and contact by a stiffness on present overlaps."""
         assert self.penalty is not None
-        may, self._may_touch = self._may_touch, self._may_touch[:0]
+        faces, may = self._faces, self._may_touch
+        self._faces = replace(faces, may_touch=may[:0])
         forces = self._by_multipliers(acting, free, hh)
-        self._may_touch = may
-        overlap = np.minimum(self._normal_gaps(self.gap)[may], 0.0)
+        self._faces = faces
+        overlap = np.minimum(faces.normal_gaps(self.gap)[may], 0.0)
         touch, overlap = may[overlap < 0.0], overlap[overlap < 0.0]
         if not len(touch):
             return forces
@@ -523,10 +506,16 @@ class InterfaceDynamics:
 
     def chosen_bonds(self, rows: Ints) -> ChosenBonds:
         """Prepare :meth:`bonds_at` for some tied rows, shape (n,)."""
+        if np.any(self.elastic.active[rows]):
+            jumps = self.lumped.mean_jumps(rows[:, None], np.ones((len(rows), 1)))
+            return ChosenBonds(jumps, None, self.elastic.stiffness_of(rows))
         return ChosenBonds(*self.lumped.bonds_of(rows, self._fixed))
 
     def bonds_at(self, chosen: ChosenBonds) -> Array:
         """Bond forces on the slaves of chosen rows, shape (n gdim,), force."""
+        if chosen.stiffness is not None:
+            d = chosen.by_forces(self._u).reshape(-1, self._shape[1])
+            return np.asarray(-np.einsum("ncd,nd->nc", chosen.stiffness, d)).ravel()
         more = self._more
         out = chosen.by_forces(self._forces if more is None else self._forces + more)
         if chosen.by_motion is not None:
@@ -551,7 +540,7 @@ class InterfaceDynamics:
         chosen = np.flatnonzero(rows[self.lumped.open])
         if not len(chosen):
             return 0.0, -1
-        gaps = self._normal_gaps(self.gap)[chosen]
+        gaps = self._faces.normal_gaps(self.gap)[chosen]
         i = int(np.argmin(gaps))
         return float(gaps[i]), int(self.lumped.open[chosen[i]])
 

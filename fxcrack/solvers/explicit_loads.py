@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.load_vectors import LoadPattern, load_vector, monitor_weights
 from fxcrack.continuum.loads import Load, Monitor
+from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
 from fxcrack.interface.lumped import LumpedInterface
 
 
@@ -18,19 +20,24 @@ class LoadsAndMonitors:
 
     Args:
         continuum: Displacement space.
-        loads: Force patterns.
+        loads: Force patterns, those of the temperature last.
         monitors: Monitored displacements.
 
     Raises:
         InputError: A load or a monitor does not fit the bodies.
+
+    Attributes:
+        n_thermal: How many patterns belong to the temperature.
     """
 
     def __init__(
-        self, continuum: Continuum, loads: Sequence[Load], monitors: Sequence[Monitor]
+        self, continuum: Continuum, loads: Sequence[Any], monitors: Sequence[Monitor]
     ) -> None:
         self._n_local = continuum.n_local
         self._loads = [_load_pattern(continuum, load) for load in loads]
         self._monitors = [LoadPattern(monitor_weights(continuum, m)) for m in monitors]
+        self.n_thermal = sum(isinstance(load, ThermalLoad) for load in loads)
+        self._held = held_energies(continuum) if self.n_thermal else np.zeros((0, 0))
         self._on_faces: list[Array] = []
         self._at_chosen: list[LoadPattern] = []
         self._elsewhere: list[LoadPattern] = []
@@ -42,7 +49,9 @@ class LoadsAndMonitors:
             lumped: The interfaces.
         """
         nodes, n = lumped.nodes, self._n_local
-        found = [nodes.gather(p.dense(n))[lumped.slave] for p in self._loads]
+        # a temperature acts within the bodies, which its forces at their faces only balance
+        outer = self._loads[: len(self._loads) - self.n_thermal]
+        found = [nodes.gather(p.dense(n))[lumped.slave] for p in outer]
         has = any(np.any(f) for f in found)
         self._on_faces = found if has else []
         return has
@@ -87,7 +96,7 @@ class LoadsAndMonitors:
     def on_faces(self, factors: Array) -> Array:
         """Forces on the slave nodes, shape (n_rows, gdim), force."""
         return sum(
-            (factor * f for factor, f in zip(factors.tolist(), self._on_faces, strict=True)),
+            (factor * f for factor, f in zip(factors.tolist(), self._on_faces, strict=False)),
             np.zeros(1),
         )
 
@@ -103,12 +112,22 @@ class LoadsAndMonitors:
         """Displacements conjugate to the loads, length; this rank's part of each."""
         return [float(p.values @ u[p.at]) for p in self._loads]
 
+    def thermal_part(self, factors: Array, answers: Array) -> float:
+        """What the temperature takes off 1/2 u K u to give the energy stored, force x length.
+
+        Args:
+            factors: Load factors, those of temperature patterns last, shape (n_forces,).
+            answers: Displacements conjugate to the loads, sums over ranks, same shape.
+        """
+        factors, answers = factors[-self.n_thermal :], answers[-self.n_thermal :]
+        return float(factors @ answers - 0.5 * factors @ self._held @ factors)
+
     def monitored(self, u: Array) -> list[float]:
         """Monitored displacements, length; this rank's part of each."""
         return [float(p.values @ u[p.at]) for p in self._monitors]
 
 
-def _load_pattern(continuum: Continuum, load: Load) -> LoadPattern:
+def _load_pattern(continuum: Continuum, load: Load | ThermalLoad) -> LoadPattern:
     vector = load_vector(continuum, load)
     out = LoadPattern(np.array(vector.array_r))
     vector.destroy()

@@ -11,6 +11,8 @@ from fxcrack.solvers.explicit_bonds import SofteningBonds
 
 SWEEPS = 200
 """Sweeps, at most, over nodes that share masters; those of stiff bonds take many."""
+_AT_ONCE = 30
+"""Sweeps in which all bonds take the forces of the sweep before."""
 _SETTLED = 1e-12
 """Change of forces in a sweep, over the largest of them, that ends the sweeps."""
 _FREE = 1.0 - 1e-12
@@ -29,6 +31,7 @@ class LiveBonds:
     Attributes:
         rows: Rows of the interface, shape (n,).
         direction: Directions of their openings, shape (n, gdim).
+        origin: Jumps from which openings count, shape (n,), length.
         along: Openings by the motion of the nodes, (n, n_nodes gdim).
         push: Accelerations of the nodes by forces along the openings, (n_nodes gdim, n).
         coupling: Accelerations of the openings by such forces, shape (n, n).
@@ -43,6 +46,7 @@ class LiveBonds:
         self.push, self.coupling = lumped.pull_along(k, self.direction)
         self.coupled = not lumped.simple
         self._strength, self._final = bonds.strength[k], bonds.final[k]
+        self.origin = bonds.origin[k]
         self._numbers = list(zip(self._strength.tolist(), self._final.tolist(), strict=True))
         self.low, self.top = bonds.low[k].tolist(), bonds.top[k].tolist()
         self._diagonal = self.coupling.diagonal().copy()
@@ -90,16 +94,43 @@ class LiveBonds:
             hh: dt h.
         """
         here, free = self.along.into(u, self._buffers[0]), self.along.into(x, self._buffers[1])
+        return self.together(here - self.origin, free - self.origin, hh)
+
+    def together(self, here: Array, free: Array, hh: float) -> Array:
+        """Forces of the bonds on each other's openings, tension positive, shape (n,).
+
+        All at once, as long as that converges; one after the other where stiff secants share
+        masters.
+
+        Args:
+            here: Openings at the start of the increment from :attr:`origin`, shape (n,), length.
+            free: Openings at its end without the forces of any of them, same shape.
+            hh: dt h.
+        """
         if not self.coupled:
             self._last = self.alone(here, free, hh)
             return self._last
         force = self._last
-        for _ in range(SWEEPS):
+        for _ in range(_AT_ONCE):
             before = force
             force = self.alone(here, free - hh * (self._others @ before), hh)
             if settled(force, before):
                 break
+        else:
+            force = self._in_turn(here, free, force, hh)
         self._last = force
+        return force
+
+    def _in_turn(self, here: Array, free: Array, force: Array, hh: float) -> Array:
+        force = force.copy()
+        at, own = here.tolist(), (0.5 * hh * self._diagonal).tolist()
+        for _ in range(SWEEPS):
+            before = force.copy()
+            for i, (f0, wf) in enumerate(self._numbers):
+                change = 0.5 * (at[i] + free[i] - hh * (self._others[i] @ force)) - self.low[i]
+                force[i] = force_of_one(f0, wf, self.low[i], self.top[i], change, own[i])
+            if settled(force, before):
+                break
         return force
 
     def follow(
@@ -119,6 +150,7 @@ class LiveBonds:
         self.along.into(before, old)
         self.along.into(v, new)
         self.along.into(u, at)
+        at -= self.origin
         bonds, k, spent = self._bonds, self.rows, 0.0
         numbers = zip(
             forces.tolist(), old.tolist(), new.tolist(), at.tolist(), k.tolist(), strict=True

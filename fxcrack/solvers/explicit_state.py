@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,9 @@ from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import FileOrder
+from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds
+from fxcrack.solvers.explicit_energies import Totals
 from fxcrack.solvers.explicit_interface import InterfaceDynamics, InterfaceEnergies
 
 Arrays = dict[str, npt.NDArray[Any]]
@@ -28,12 +30,14 @@ class InterfaceSnapshot:
 
     Attributes:
         tied: Rows that are tied, shape (n_rows,).
+        elastic: Rows whose elastic bonds hold, shape (n_rows,).
         bonds: Softening bonds.
         fading: Bonds that fade.
         energies: What has left the bodies.
     """
 
     tied: Bools
+    elastic: Bools
     bonds: SofteningBonds
     fading: list[Fading]
     energies: InterfaceEnergies
@@ -44,8 +48,8 @@ class InterfaceSnapshot:
         bonds = dynamics.bonds
         copied = {f.name: getattr(bonds, f.name).copy() for f in fields(bonds)}
         return cls(
-            dynamics.lumped.tied.copy(), SofteningBonds(**copied), list(dynamics.fading),
-            replace(dynamics.energies),
+            dynamics.lumped.tied.copy(), dynamics.elastic.active.copy(), SofteningBonds(**copied),
+            list(dynamics.fading), replace(dynamics.energies),
         )  # fmt: skip
 
     def restore(self, dynamics: InterfaceDynamics) -> None:
@@ -54,11 +58,12 @@ class InterfaceSnapshot:
         dynamics.bonds = SofteningBonds(**again)
         dynamics.fading = list(self.fading)
         dynamics.energies = replace(self.energies)
+        dynamics.elastic.active = self.elastic.copy()
         dynamics.set_ties(self.tied)
 
     def arrays(self) -> Arrays:
         """Plain arrays by name: those of the bonds, rows and forces of fading ones, energies."""
-        out: Arrays = {"tied": self.tied}
+        out: Arrays = {"tied": self.tied, "elastic": self.elastic}
         out |= {f"bonds.{f.name}": getattr(self.bonds, f.name) for f in fields(self.bonds)}
         out["energies"] = np.array(list(asdict(self.energies).values()))
         gdim = self.bonds.direction.shape[1]
@@ -85,7 +90,8 @@ class InterfaceSnapshot:
             for r, f, (_, increments, viscosity, age) in zip(rows, forces, law, strict=False)
         ]
         energies = InterfaceEnergies(*arrays["energies"].astype(float).tolist())
-        return cls(arrays["tied"].astype(bool), bonds, fading, energies)
+        tied, elastic = (arrays[name].astype(bool) for name in ("tied", "elastic"))
+        return cls(tied, elastic, bonds, fading, energies)
 
 
 @dataclass(frozen=True)
@@ -98,9 +104,11 @@ class MotionSnapshot:
         interfaces: State of the interfaces.
         at: Time of the displacement.
         last_dt: Length of the last increment, time.
-        sums: Work of supports and loads, energy of damping, energy at the start and energy gone
-            with changes of the increment, sums over all ranks; force times length.
+        sums: Energies as :meth:`MotionEnergies.totals` gives them, force times length.
         increments: How many were done.
+        coordinates: Coordinates of support columns and load factors at the start of the increment
+            and at its end, shape (n_loads,) each; ``None`` where they are not known.
+        bodies: State of bodies that depend on those they passed.
     """
 
     u: Array
@@ -108,8 +116,10 @@ class MotionSnapshot:
     interfaces: InterfaceSnapshot
     at: float
     last_dt: float
-    sums: tuple[float, float, float, float]
+    sums: Totals
     increments: int
+    coordinates: tuple[Array, Array] | None = None
+    bodies: dict[str, Array] = field(default_factory=dict)
 
 
 class MotionFiles:
@@ -117,10 +127,11 @@ class MotionFiles:
 
     Args:
         continuum: Displacement space.
+        bodies: The bodies.
     """
 
-    def __init__(self, continuum: Continuum) -> None:
-        self._continuum = continuum
+    def __init__(self, continuum: Continuum, bodies: InternalForces) -> None:
+        self._continuum, self._bodies = continuum, bodies
         self._order = FileOrder(continuum.mesh.domain)
         self._field = fem.Function(continuum.space)
 
@@ -129,7 +140,8 @@ class MotionFiles:
 
         Returns:
             displacement, velocity and positions of all nodes in the order of the input, on rank 0;
-            motion, the numbers of the state; interfaces.*, bonds and energies by row.
+            motion, the numbers of the state; interfaces.*, bonds and energies by row; bodies.*,
+            what bodies remember, cell by cell.
         """
         out: Arrays = {
             "displacement": self.gather(saved.u),
@@ -137,18 +149,28 @@ class MotionFiles:
             "positions": self.positions(),
             "motion": np.array([saved.at, saved.last_dt, *saved.sums, saved.increments]),
         }
+        places = self._bodies.places()
+        for name, values in saved.bodies.items():
+            whole = self._order.gather(values, places[name]) if name in places else values
+            out[f"bodies.{name}"] = whole
         return out | {f"interfaces.{k}": v for k, v in saved.interfaces.arrays().items()}
 
     def snapshot(self, arrays: Arrays) -> MotionSnapshot:
         """The state that :meth:`arrays` were made of, on any number of ranks; collective."""
-        at, last_dt, work, damped, initial, renewed, increments = (
+        at, last_dt, work, damped, viscous, initial, renewed, heated, increments = (
             arrays["motion"].astype(float).tolist()
         )
+        places, local, bodies = self._bodies.places(), self._bodies.state(), {}
+        for name, mine in local.items():
+            values = arrays[f"bodies.{name}"]
+            if name in places:
+                values = self._order.scatter(values, places[name]).reshape(mine.shape)
+            bodies[name] = values.astype(float)
         part = {k.removeprefix("interfaces."): v for k, v in arrays.items() if "interfaces." in k}
         return MotionSnapshot(
             self.scatter(arrays["displacement"]), self.scatter(arrays["velocity"]),
-            InterfaceSnapshot.from_arrays(part), at, last_dt, (work, damped, initial, renewed),
-            int(increments),
+            InterfaceSnapshot.from_arrays(part), at, last_dt,
+            (work, damped, viscous, initial, renewed, heated), int(increments), bodies=bodies,
         )  # fmt: skip
 
     def gather(self, owned: Array) -> Array:

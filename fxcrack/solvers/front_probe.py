@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from mpi4py import MPI
 from scipy.linalg import cho_solve
@@ -9,6 +11,7 @@ from scipy.linalg import cho_solve
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.front import Front
 from fxcrack.interface.pairing import Pair
 from fxcrack.solvers.base import Solver
@@ -52,7 +55,19 @@ class CondensedFrontProbe:
         rows = np.unique(index[index >= 0])
         values = np.zeros(solver.system.n_retained)
         values[rows] = -solver.system.forces(state, rows)
-        return solver.vectors(self._p, nodes, values)
+        return solver.vectors(self._p, nodes, values) - self._under_bonds(nodes, state)
+
+    def _under_bonds(self, nodes: Ints, state: Equilibrium) -> Array | float:
+        """What pressures that follow the crack add to the forces of bonds, shape (..., 3)."""
+        solver = self._solver
+        total: Array | float = 0.0
+        first = solver.n_loads - len(solver.loads)
+        for k, load in enumerate(solver.loads):
+            if isinstance(load, CrackPressure) and load.p == self._p and state.loads[first + k]:
+                each = np.zeros((self.front.surface.n_nodes, 3))
+                each[:, : self.gdim] = load.under_bonds(self.front.bonded)
+                total = total + float(state.loads[first + k]) * each[nodes]
+        return total
 
     def round_off(self, nodes: Ints, state: Equilibrium) -> Array:
         """How large bond forces may be by round-off alone, shape (...) [force]."""
@@ -64,7 +79,8 @@ class CondensedFrontProbe:
         error = np.minimum(system.cholesky.round_off, most)
         each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
         if not each.any() and system.n_retained:
-            each[:-1] = _OF_PRODUCTS * (np.abs(system.schur[:, : len(x)]) @ x)
+            rows = np.unique(index[index >= 0])
+            each[rows] = _OF_PRODUCTS * (np.abs(system.schur[rows, : len(x)]) @ x)
         return np.asarray(each[np.where(index >= 0, index, -1)].max(axis=-1))
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
@@ -80,7 +96,8 @@ class CondensedFrontProbe:
         """Loads on the faces, global vectors of shape (..., 3) [force]."""
         solver = self._solver
         factors = state.loads[solver.n_loads - len(solver.loads) :]
-        return solver.vectors(self._p, nodes, solver.face_loads @ factors)
+        every = solver.vectors(self._p, nodes, solver.face_loads @ factors)
+        return every - self._under_bonds(nodes, state)
 
     def released_jumps(self, nodes: Ints, force: Array, normal: Array | None = None) -> Array:
         """Jumps that releasing some nodes would open, global vectors of shape (k, 3) [length]."""
@@ -124,6 +141,25 @@ class CondensedFrontProbe:
         world = np.zeros((len(index), 3))
         world[:, : self.gdim] = np.einsum("kci,ki->kc", frames, jump)
         return world
+
+    def opened(self, nodes: Ints, closed: Bools, force: Array, state: Equilibrium) -> Equilibrium:
+        """The state that releasing bonded nodes would lead to, everything else as it is."""
+        index, frames = self._solver.index[self._p][nodes], self._solver.frames[self._p][nodes]
+        moves = index >= 0
+        moves[:, 0] &= ~closed
+        new = index[moves]
+        system = self._solver.system
+        local = np.einsum("kci,kc->ki", frames, force[:, : self.gdim])[moves]
+        try:
+            factor = system.cholesky.factorise(system.reduced(new), new)
+        except NotPositiveDefinite:
+            return state
+        opening = cho_solve((factor, True), local)
+        jump, free = state.jump.copy(), system.cholesky.free
+        jump[new] += opening
+        if len(free):
+            jump[free] -= system.cholesky.solve(system.schur[np.ix_(free, new)] @ opening)
+        return replace(state, jump=jump)
 
     def mean_position(self, group: str) -> Array:
         """Mean reference position of the nodes of a group, shape (3,) [length]; collective.

@@ -41,6 +41,7 @@ class IncrementWork:
         friction: Energy dissipated by friction.
         contact: Energy taken by contact impulses of bodies in motion beyond that, by the
             trapezoidal rule.
+        overlap: Work of contact impulses that pushed overlapping faces apart.
     """
 
     start: Equilibrium
@@ -50,6 +51,7 @@ class IncrementWork:
     bonds: float
     friction: float
     contact: float = 0.0
+    overlap: float = 0.0
 
     def support_work(self, n_forces: int) -> float:
         """Work of supports, where there are ``n_forces`` force patterns."""
@@ -125,13 +127,13 @@ class TrialIncrement:
         )
         states = [*(point for _, point in points), end]
         bonds = sum(bond_work(a, b) for a, b in pairwise(states))
-        contact = 0.0
+        contact = overlap = 0.0
         conjugate += _along(points, "conjugate")
         if self.impulses is not None:
             more = self.impulses.supports
             conjugate[: len(more)] += more
             bonds += self.impulses.bonds
-            contact = self.impulses.beyond
+            contact, overlap = self.impulses.beyond, self.impulses.overlap
         return IncrementWork(
             here,
             end,
@@ -140,6 +142,7 @@ class TrialIncrement:
             bonds + float(given @ jump),
             self.friction,
             contact,
+            overlap,
         )
 
 

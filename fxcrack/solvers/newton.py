@@ -24,8 +24,8 @@ from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
-from fxcrack.solvers.can_fly import can_fly
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
+from fxcrack.solvers.free_motion import moves_freely
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
 from fxcrack.solvers.increment_work import (
     IncrementWork,
@@ -195,7 +195,9 @@ class NewtonSolver(InterfaceSolver):
             dt: Length of the first increment, time.
         """
         inertia = self.bodies.inertia
-        if inertia is not None and can_fly(self.continuum, self.supports, self.pairs, self.fronts):
+        if inertia is not None and moves_freely(
+            self.continuum, self.supports, self.pairs, self.fronts
+        ):
             self.free_start = True
             inertia.expect(dt)
 
@@ -317,7 +319,7 @@ class NewtonSolver(InterfaceSolver):
             self.bodies.commit()
         elif inertia is not None:
             self.bodies.set(self.u)
-            inertia.begin_at(self.bodies.u)
+            self.bodies.begin_at()
         if trial.work.contact:
             assert inertia is not None
             inertia.add_loss(trial.work.contact)
@@ -517,6 +519,8 @@ class NewtonSolver(InterfaceSolver):
 
     def _overlap_work(self, here: Equilibrium, point: Equilibrium) -> float:
         """Work of contact that pushed overlapping faces apart in the last trial."""
+        if self.bodies.dynamic:
+            return self._work_of(here, point).overlap
         closing = self.system.closing(here, point)
         # nothing pressed on them before, and the pressure grows as they move apart
         mean = 0.5 * self.system.pressure(point, closing)
@@ -564,6 +568,15 @@ class NewtonSolver(InterfaceSolver):
         out = self.tangent.condensation.displacement(last)
         out.axpy(1.0, self.u)
         return out
+
+    def displacement_of_jumps(self, jump: Array) -> PETSc.Vec:
+        """Change of displacement by a change of retained jumps, shape (n_retained,); collective.
+
+        By the tangent, loads as they are; the caller destroys it.
+        """
+        last = np.zeros(self.tangent.coordinates.n_last)
+        last[: self.system.n_retained] = jump
+        return self.tangent.condensation.displacement(last)
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them."""

@@ -21,7 +21,8 @@ class NewtonOptions:
             every iteration has its own (Newton's method to the letter, quadratic at the end).
         balance: Part of the stored energy by which work and energies may be off after one
             increment; where it is more the increment is divided, down to 1/512 of it. inf takes
-            every increment whole. Not for plasticity and inertia, which count otherwise.
+            every increment whole. Bodies that yield are held to it as well; those with inertia
+            are not, as their time integration accounts for the energies.
     """
 
     tolerance: float = 1e-10
@@ -57,6 +58,7 @@ class ExplicitOptions:
         mass_scale: Factor on the mass of all bodies, or ``"dt"``: mass is added to nodes where
             ``dt`` would not be stable.
         operator: "product", "assembly", or "auto".
+        bulk: Linear and quadratic bulk viscosity.
         tolerance: Part of the energies by which their balance may be off before the run stops.
     """
 
@@ -66,4 +68,5 @@ class ExplicitOptions:
     penalty: float = 0.1
     mass_scale: float | str = 1.0
     operator: str = "auto"
+    bulk: tuple[float, float] = (0.0, 0.0)
     tolerance: float = 1e-6

@@ -209,7 +209,8 @@ class IncrementSolver:
         """
         tangent, bodies = self._tangent, self._tangent.bodies
         here, end = trial.points[0][1], trial.end
-        trapezoidal = bodies.dynamic or bodies.path_dependent
+        # where nothing was corrected bodies that yield did not, and the path predicted is exact
+        trapezoidal = bodies.dynamic or (bodies.path_dependent and trial.iterations > 0)
         limit = 0.0 if exact else np.inf if trapezoidal else _FAR_OFF
         if trial.iterations and trial.drift > limit and not bodies.constant:
             tangent.factor()

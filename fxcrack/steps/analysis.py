@@ -19,7 +19,10 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.follower_pressure import FollowerPressure
+from fxcrack.continuum.foundation import Stabilise
 from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.loads import AmplitudeLike, Ramp
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import History
@@ -34,6 +37,9 @@ from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.force_ramps import ForceRamp, given_forces, still_pulling
 
+_ROUND_OFF = 1e-10
+"""Overlap of faces over the size of their facets that is round-off of coordinates."""
+
 
 @dataclass
 class EnergyBalance:
@@ -47,6 +53,8 @@ class EnergyBalance:
         by_force: The part of it that left through all other bonds.
         viscous: The part of that which viscosity dissipated.
         kinetic: Kinetic energy of a velocity that bodies are given at the start.
+        held_from: Loads that are not proportional to time are taken at no earlier time than this,
+            so that they stay as they are where a step moves the proportional ones back.
     """
 
     time: float = 0.0
@@ -56,6 +64,7 @@ class EnergyBalance:
     by_force: float = 0.0
     viscous: float = 0.0
     kinetic: float = 0.0
+    held_from: float = 0.0
 
     def copy(self) -> EnergyBalance:
         """The present values, to return to."""
@@ -99,6 +108,7 @@ class Analysis:
         ramps: Bonds whose force is released with time or over increments.
         fatigue: What cycles leave behind for later ones.
         started: Whether there is an equilibrium yet.
+        stabilise: The weak foundation of bodies, as the user gave it.
     """
 
     continuum: Continuum
@@ -114,6 +124,7 @@ class Analysis:
     ramps: list[ForceRamp] = field(default_factory=list)
     fatigue: FatigueState = field(default_factory=FatigueState)
     started: bool = False
+    stabilise: Stabilise | None = None
 
     # -- what it consists of -------------------------------------------------------------
 
@@ -195,6 +206,8 @@ class Analysis:
         solver = self.condensed
         system = solver.system
         overlap = np.where(system.contact, np.maximum(-system.gap, 0.0), 0.0)
+        size = max((pair.surface.facet_size for pair in self.pairs), default=0.0)
+        overlap[overlap <= _ROUND_OFF * size] = 0.0
         dynamic = any(isinstance(e, Inertia) for e in self.effects)
         if not dynamic and not overlap.any():
             return
@@ -215,16 +228,34 @@ class Analysis:
 
     def loads_at(self, time: float) -> Array:
         """Amplitudes of all supports and load factors at a time, shape (n_loads,)."""
-        values = [c.coordinate(time) for c in self.solver.supports.columns]
-        return np.array(values + [load.amplitude(time) for load in self.solver.loads])
+        held = max(time, self.balance.held_from)
+
+        def at(amplitude: AmplitudeLike) -> float:
+            return time if isinstance(amplitude, Ramp) else held
+
+        values = [c.coordinate(at(c.support.amplitude)) for c in self.solver.supports.columns]
+        loads = self.solver.loads
+        return np.array(values + [x.amplitude(at(x.amplitude)) for x in loads])
 
     def load_breaks(self) -> tuple[float, ...]:
         """Times at which an amplitude changes its slope, sorted."""
-        moving = [c.support.amplitude for c in self.solver.supports.columns if c.moves]
-        every = moving + [load.amplitude for load in self.solver.loads]
-        if self.continuum.temperature is not None:
-            every += self.continuum.temperature.amplitudes
-        return tuple(sorted({b for a in every for b in a.breaks()}))
+        return tuple(sorted({b for a in self.amplitudes() for b in a.breaks()}))
+
+    def amplitudes(self) -> list[AmplitudeLike]:
+        """Factors in time of all that moves or loads the bodies."""
+        every = [c.support.amplitude for c in self.solver.supports.columns if c.moves]
+        every += [load.amplitude for load in self.solver.loads]
+        return every + self.amplitudes_of_bodies()
+
+    def amplitudes_of_bodies(self) -> list[AmplitudeLike]:
+        """Those that the forms of the bodies evaluate: of a temperature, of pressures that follow.
+
+        In linear bodies a temperature is one of the loads as well.
+        """
+        found = [] if self.continuum.temperature is None else self.continuum.temperature.amplitudes
+        solver = self.solver
+        terms = solver.bodies.terms if isinstance(solver, NewtonSolver) else ()
+        return [*found, *(t.amplitude for t in terms if isinstance(t, FollowerPressure))]
 
     def given_force(self, time: float) -> Array:
         """Given forces of bonds on a ramp at a time, shape (n_retained,), force."""

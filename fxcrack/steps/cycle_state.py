@@ -21,10 +21,13 @@ class TipCycle:
         rates: Energy release rates at n front nodes.
         dadN: Growth per cycle, shape (n,), length: by the law, 0 below the threshold, the whole
             element beyond the upper limit.
+        peak: What the evaluator measured at each node at its own G_max, which need not be the
+            instant at which others have theirs, shape (n, m).
     """
 
     rates: CycleRates
     dadN: Array
+    peak: Array
 
     def column(self, name: str) -> Array:
         """G_max, dG, G_c or dadN, shape (n,)."""

@@ -128,11 +128,14 @@ class _Cycling:
         partly = None
         if self._partly:
             partly = PartialGrowth(self._analysis, self._stabilised_cycle, self._limit)
+            if resume is not None:
+                partly.block = resume.get("block", partly.block)
         attach_ligaments(self._analysis)
         self._analysis.evaluate_tips()
         known = False
         while True:
-            driver.checkpoint_point(event=event, top=top, limit=self._limit)
+            block = None if partly is None else partly.block
+            driver.checkpoint_point(event=event, top=top, limit=self._limit, block=block)
             if not known:
                 self._seen = self._stabilised_cycle()
             driver.record(event)
@@ -278,18 +281,20 @@ class _Cycling:
         for i, (g, v) in enumerate(self._analysis.at_tips()):
             criterion, evaluator = cyclic_parts(g)
             if not len(v.tips):
-                out.append(TipCycle(CycleRates(*np.zeros((5, 0))), np.zeros(0)))
+                out.append(TipCycle(CycleRates(*np.zeros((5, 0))), np.zeros(0), np.zeros((0, 0))))
                 continue
-            rates = [
+            pieces = [
                 rates_between(evaluator, v.tips, a.measured[i], b.measured[i])
                 for a, b in pairwise(way)
             ]
-            found = criterion.cycle(np.concatenate(rates), evaluator.toughness[v.tips.node])
+            rates, measured = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
+            found = criterion.cycle(rates, evaluator.toughness[v.tips.node])
+            peak = measured[total(rates).argmax(axis=0), range(len(v.tips))]
             law = criterion.growth_law
             regime = law.regimes(found)
             growth = np.where(regime == Regime.PARIS, law.growth(found), 0.0)
             growth = np.where(regime == Regime.UNSTABLE, advance(v.tips), growth)
-            out.append(TipCycle(found, growth))
+            out.append(TipCycle(found, growth, peak))
         return out
 
     # -- over the cycles to the next release ---------------------------------------------
@@ -472,7 +477,7 @@ class _Instant:
         return self.straight or self.contact == before.contact
 
 
-def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> Array:
+def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> tuple[Array, Array]:
     """Energy release rates on a linear piece of the cycle, the extremes of their sum among them.
 
     The sum is a parabola wherever no mode is clipped at zero. It is taken at five points and at
@@ -485,11 +490,13 @@ def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> A
         b: The same at the end.
 
     Returns:
-        Rates by mode, shape (7, n, 3), force/length.
+        Rates by mode, shape (7, n, 3), force/length; what belongs to them, shape (7, n, m).
     """
     n = len(tips)
-    many = np.concatenate([(1.0 - x) * a + x * b for x in _GRID])
-    rates = [evaluator.rates(repeat_tips(tips, len(_GRID)), many).reshape(len(_GRID), n, 3)]
+    many = np.stack([(1.0 - x) * a + x * b for x in _GRID])
+    flat = many.reshape(-1, many.shape[2])
+    rates = [evaluator.rates(repeat_tips(tips, len(_GRID)), flat).reshape(len(_GRID), n, 3)]
+    measured = [many]
     sums = total(rates[0])
     for place in (sums.argmin(axis=0), sums.argmax(axis=0)):
         i = np.clip(place, 1, len(_GRID) - 2)
@@ -497,5 +504,6 @@ def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> A
         bend = left - 2.0 * middle + right
         shift = np.divide(0.5 * (left - right), bend, out=np.zeros(n), where=bend != 0.0)
         x = np.clip(_GRID[i] + _GRID[1] * shift, 0.0, 1.0)[:, None]
-        rates.append(evaluator.rates(tips, (1.0 - x) * a + x * b)[None])
-    return np.concatenate(rates)
+        measured.append(((1.0 - x) * a + x * b)[None])
+        rates.append(evaluator.rates(tips, measured[-1][0])[None])
+    return np.concatenate(rates), np.concatenate(measured)

@@ -138,10 +138,9 @@ class _SideBySide:
     laws: tuple[FatigueLaw, ...]
     counts: tuple[int, ...]
 
-    @property
-    def life_exponent(self) -> float:
+    def life_exponent(self, toughness: float) -> float:
         """The largest of all."""
-        return max(law.life_exponent for law in self.laws)
+        return max(law.life_exponent(toughness) for law in self.laws)
 
     def _parts(self, cycle: CycleRates) -> list[tuple[FatigueLaw, CycleRates]]:
         """Laws of interfaces with tips, and the cycle at these."""

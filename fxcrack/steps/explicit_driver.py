@@ -62,7 +62,8 @@ class ExplicitDriver:
         if resume is not None:
             for speed, passed in zip(self.speeds, resume["passed"], strict=True):
                 speed.passed = [(float(t), float(a)) for t, a in passed]
-        self._follows = not solver.bodies.linear and any(t.finite for t in solver.bodies.terms)
+        self._follows = solver.bodies.finite
+        self._may_become_unstable = solver.stability.changes
         self._good: tuple[Any, list[int], int] | None = None
         self._may_overlap = np.zeros(solver.lumped.n_rows, dtype=bool)
         for pair, rows in zip(solver.pairs, solver.row_of, strict=True):
@@ -162,11 +163,11 @@ class ExplicitDriver:
         if not off <= limit:
             return self._stop(off, limit)
         self._warn_of_overlap()
-        if self._follows and event == "increment":
+        if self._may_become_unstable and event == "increment":
             stable = self.solver.renew_stable_increment()
             if stable < self.solver.dt:
                 return self._stopped(
-                    f"deformation has lowered the stable increment to {stable:g}, below dt = "
+                    f"motion has lowered the stable increment to {stable:g}, below dt = "
                     f"{self.solver.dt:g}; take Explicit(safety="
                     f"{0.9 * self.step.safety * stable / self.solver.dt:.2g})"
                 )
@@ -214,7 +215,7 @@ class ExplicitDriver:
         solver = self.solver
         if not self._may_overlap.any():
             return
-        gap, row = solver.dynamics.smallest_gap(self._may_overlap)
+        gap, row = solver.dynamics.smallest_gap(self._may_overlap & ~solver.dynamics.elastic.active)
         if row < 0 or gap >= -_OVERLAP * float(np.abs(solver.jumps).max()):
             return
         p = int(solver.lumped.pair[row])

@@ -144,12 +144,12 @@ class ReleaseControl:
             energy, area, force = self._to_spend(nodes, values, forces)
         crack.front.release(nodes)
         dynamics = solver.dynamics
-        dynamics.release(rows)
+        lost = dynamics.release(rows)
         viscosity = crack.criterion.viscosity
         if law.driver == "opening":
             f = values.f[np.searchsorted(values.tips.node, nodes)]
             power = 0.5 if crack.evaluator.degree is None else 1.0 / crack.evaluator.degree
-            dynamics.soften(rows, force, (self.onset / f) ** power, energy, area)
+            dynamics.soften(rows, force, (self.onset / f) ** power, energy, area, lost)
         elif law.driver == "increments":
             dynamics.fading.append(Fading(rows, forces, int(getattr(law, "increments", 1)), 0.0))
         elif viscosity > 0.0:

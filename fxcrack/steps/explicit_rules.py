@@ -8,9 +8,11 @@ from typing import Any
 from fxcrack.base import log
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.loads import Load, Pressure
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.criteria import VCCT
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.pairing import Interface
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit_release import law_of
@@ -38,34 +40,63 @@ def inertia_of(effects: Sequence[Any]) -> Inertia:
     return effect
 
 
-def check_bodies(continuum: Continuum, loads: Sequence[Load]) -> None:
+def check_bodies(continuum: Continuum, loads: Sequence[Any]) -> None:
     """Refuse bodies and loads that explicit dynamics does not have.
 
     Raises:
         InputError: Says which, and what to do instead.
     """
+    if isinstance(continuum, ShellBodies):
+        raise InputError(
+            "Explicit: shells on surface meshes have no lumped masses for explicit dynamics; use a "
+            "Dynamic step, or ContinuumShell on hexahedra of first order"
+        )
     if continuum.order != 1:
         raise InputError(
             "Explicit needs first-order elements: row sums of second-order ones give corner nodes "
             "a negative mass; write Scene(..., order=1), or use a Dynamic step"
         )
+    for load in loads:
+        if isinstance(load, CrackPressure):
+            raise InputError(
+                f"Explicit: pressure '{load.title}' with follows_crack is not available in "
+                "explicit dynamics; use a Static or Dynamic step"
+            )
+
+
+def check_start(continuum: Continuum, interfaces: Sequence[Interface]) -> None:
+    """Refuse a start in equilibrium that statics of exact bonds and elastic bodies does not give.
+
+    Raises:
+        InputError: A material yields, or bonds have a stiffness.
+    """
+    for interface in interfaces:
+        if interface.stiffness is not None:
+            raise InputError(
+                f"Explicit: start='equilibrium' is that of exact bonds, and interface "
+                f"'{interface.title}' has bonds with a stiffness; begin at rest, and apply the "
+                "loads slowly (SmoothStep)"
+            )
     for material in continuum.part_materials:
         if getattr(material, "form", "elastic") == "plastic":
             raise InputError(
-                "Explicit: Plastic is not available in explicit dynamics; use an elastic material, "
-                "or a Dynamic step"
+                "Explicit: start='equilibrium' does not know what bodies that yield have gone "
+                "through; begin at rest, and apply the loads slowly (SmoothStep)"
             )
-    if continuum.temperature is not None:
+
+
+def check_constraints(constraints: Sequence[Constraint]) -> None:
+    """Refuse couplings and equations, which lumped masses do not know.
+
+    Raises:
+        InputError: There is one.
+    """
+    if constraints:
         raise InputError(
-            "Explicit: Temperature is not available in explicit dynamics; leave it out, or use a "
-            "Dynamic step"
+            f"Explicit: couplings and equations ('{constraints[0].title}') are not available in "
+            "explicit dynamics; prescribe the displacements of the nodes by Displacement, or load "
+            "them by PointForce"
         )
-    for load in loads:
-        if isinstance(load, Pressure) and load.follows:
-            raise InputError(
-                f"Explicit: pressure '{load.title}' follows the bodies, which explicit dynamics "
-                "does not have; use follows=False, or a Dynamic step"
-            )
 
 
 def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> None:
@@ -130,4 +161,4 @@ def warn_of_step_release(debonds: Sequence[Debond]) -> None:
             )
 
 
-__all__ = ["check_bodies", "check_interfaces", "inertia_of", "warn_of_step_release"]
+__all__ = ["check_bodies", "check_interfaces", "check_start", "inertia_of", "warn_of_step_release"]

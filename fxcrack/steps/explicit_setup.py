@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.continuum.loads import Load
+from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.term import Term
+from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.interface.supports import warn_of_held_bonds
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_bodies, inertia_of
+from fxcrack.steps.explicit_rules import check_bodies, check_constraints, inertia_of
 
 
-def use_explicit_solver(
-    analysis: Analysis, loads: Sequence[Load], terms: Callable[[Continuum], Sequence[Term]]
-) -> None:
+def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequence[Term]]) -> None:
     """Give an analysis that has not begun the solver of explicit dynamics; collective.
 
     Args:
         analysis: The analysis; nothing happens where it has that solver already.
-        loads: Loads of the scene.
         terms: Makes the terms of the bodies, all but inertia.
 
     Raises:
@@ -38,10 +37,17 @@ def use_explicit_solver(
             "Explicit: this scene has run other steps before, from which explicit dynamics cannot "
             "go on; make another scene for it, scene.rebuilt()"
         )
-    check_bodies(analysis.continuum, loads)
+    check_bodies(analysis.continuum, old.loads)
+    check_constraints(old.supports.constraints)
+    found = terms(analysis.continuum)
+    heat: list[Any] = []
+    if is_linear(analysis.continuum) and all(
+        t.constant for t in found if not isinstance(t, FollowerPressure)
+    ):
+        heat = thermal_loads(analysis.continuum)
     solver = ExplicitSolver(
-        analysis.continuum, analysis.pairs, old.supports, old.loads, old.monitors,
-        terms=terms(analysis.continuum), effect=effect,
+        analysis.continuum, analysis.pairs, old.supports, [*old.loads, *heat], old.monitors,
+        terms=found, effect=effect,
     )  # fmt: skip
     old.destroy()
     analysis.solver = solver

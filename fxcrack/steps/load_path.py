@@ -13,8 +13,11 @@ from fxcrack.base.errors import ComesApart
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium, blend
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
-from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.analysis import Analysis, largest
 from fxcrack.steps.rows import Recorder
+
+_SAME = 1e-9
+"""Values of f that differ by less are the same."""
 
 
 class LoadPath(Protocol):
@@ -38,15 +41,18 @@ class LoadPath(Protocol):
             for a state reached through unstable ones, at which f has jumped over 1.
         """
 
-    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+    def back_to(
+        self, excess: Callable[[Equilibrium], float], tolerance: float, floor: float = 0.0
+    ) -> bool:
         """Take load away until a quantity has fallen to zero.
 
         Args:
             excess: The quantity in a state, linear along linear pieces.
             tolerance: What counts as zero where it cannot be met exactly.
+            floor: Time at which the search ends; at 0 no proportional load is left.
 
         Returns:
-            Whether it fell to zero before the load was zero.
+            Whether it fell to zero before that time.
         """
 
     def over_increment(self, target: float) -> None:
@@ -83,7 +89,13 @@ def crossing(
     waiting = [x for x, v in zip(found, values, strict=True) if len(v.tips)]
     if not waiting or None in waiting:
         return None
-    return max(x for x in waiting if x is not None)
+    last = max(x for x in waiting if x is not None)
+    if len(waiting) > 1:
+        # beside constant loads one may have risen above 1 again before another has fallen to it
+        time = times[0] + last * (times[1] - times[0])
+        if largest(analysis.evaluate(blend(*ends, last), time)) > 1.0 + _SAME:
+            return None
+    return last
 
 
 class LinearLoadPath:
@@ -130,14 +142,16 @@ class LinearLoadPath:
         analysis.evaluate_tips()
         return False
 
-    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+    def back_to(
+        self, excess: Callable[[Equilibrium], float], tolerance: float, floor: float = 0.0
+    ) -> bool:
         """See :meth:`LoadPath.back_to`; zero is met exactly."""
         analysis = self._analysis
         begin = analysis.time
-        for fraction, point in self._pieces_to(0.0):
+        for fraction, point in self._pieces_to(floor):
             here, start = analysis.solver.state, analysis.time
             a, b = excess(here), excess(point)
-            end = begin * (1.0 - fraction)
+            end = begin * (1.0 - fraction) + fraction * floor
             if b <= 0.0:
                 hit = a / (a - b)
                 analysis.advance(blend(here, point, hit), start + hit * (end - start))

@@ -82,6 +82,7 @@ class NewtonLoadPath:
         beyond: tuple[float, float] | None = None
         bracket: Bracket | None = None
         accepted, idle, strict = 0, 0, True  # increments accepted since the last cutback
+        undecided = 0  # how often f was on both sides of 1 at one load
         while True:
             if self._renew():
                 beyond = bracket = None  # with other pairs f was another one there
@@ -131,6 +132,10 @@ class NewtonLoadPath:
             if off >= -_AT_ONE:
                 if jumps and off > _AT_ONE:
                     self._report_jump(before, level, bracket)
+                return True
+            undecided += jumps
+            if undecided > 1:
+                self._report_jump(before, level, bracket)
                 return True
             if -off < _NEAR_ONE and -off > 0.5 * abs(before - 1.0):
                 return True  # nearer than the iteration can resolve
@@ -209,24 +214,29 @@ class NewtonLoadPath:
             if abs(after - 1.0) < _NEAR_ONE and abs(after - 1.0) > 0.5 * abs(level - 1.0):
                 return  # nearer than the iteration can resolve
 
-    def back_to(self, excess: Callable[[Equilibrium], float], tolerance: float) -> bool:
+    def back_to(
+        self, excess: Callable[[Equilibrium], float], tolerance: float, floor: float = 0.0
+    ) -> bool:
         """See :meth:`fxcrack.steps.load_path.LoadPath.back_to`.
 
         Raises:
             TooManyCutbacks: No equilibrium was found.
         """
-        whole, size = self._analysis.time, self._maximum
-        above, below = whole, None  # times at which the quantity is positive and negative
+        whole, size = self._analysis.time - floor, self._maximum
+        above, below = (
+            self._analysis.time,
+            None,
+        )  # times at which the quantity is positive and negative
         bracket: Bracket | None = None
         for _ in range(_MOST + int(min(whole / size, 1e4))):
             begin, value = self._analysis.time, excess(self._solver.state)
             self._analysis.evaluate_tips()
             if abs(value) <= tolerance:
                 return True
-            if value > 0.0 and begin <= 0.0:
+            if value > 0.0 and begin <= floor:
                 return False
             if value > 0.0:
-                above, end = begin, max(begin - size, 0.0)
+                above, end = begin, max(begin - size, floor)
             else:
                 below, end = begin, above
             guess = self._zero(excess, value, end)

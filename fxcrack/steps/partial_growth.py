@@ -114,6 +114,9 @@ class PartialGrowth:
         analysis: The analysis, at the maximum of the cycle.
         cycle: Solves a stabilised cycle.
         limit: Cycles at which the analysis ends.
+
+    Attributes:
+        block: Part of its element that a node passes in the next block at most.
     """
 
     def __init__(
@@ -122,7 +125,7 @@ class PartialGrowth:
         self._analysis = analysis
         self._cycle = cycle
         self._limit = limit
-        self._size = _STEP
+        self.block = _STEP
 
     # -- all tips, one interface after the other -------------------------------------------
 
@@ -202,20 +205,20 @@ class PartialGrowth:
             self._initiate(onsets <= fatigue.N * (1.0 + 1e-12))
             return None, seen
         with np.errstate(divide="ignore"):
-            needed = np.where(speed > 0.0, np.minimum(self._size, 1.0 - begin) / speed, np.inf)
+            needed = np.where(speed > 0.0, np.minimum(self.block, 1.0 - begin) / speed, np.inf)
         lead = int(needed.argmin())
         cycles = min(float(needed[lead]), following)
         while True:
-            self._set(np.minimum(begin + cycles * speed, 1.0))
+            self._set(np.minimum(begin + cycles * speed, 1.0), seen)
             after = self._speeds(self._cycle())
             change = _largest_change(speed, after)
             moved = float(cycles * speed[lead])
             if moved <= _LEAST or (after[lead] > 0.0 and change <= _CHANGE):
                 break
             cycles *= 0.5
-            self._size = max(0.5 * moved, _LEAST)
+            self.block = max(0.5 * moved, _LEAST)
         if change < 0.5 * _CHANGE:
-            self._size = min(1.5 * self._size, _STEP)
+            self.block = min(1.5 * self.block, _STEP)
         taken = moved / _log_mean(speed, after)[lead]
         event: Event | None = None
         if fatigue.N + taken > self._limit:
@@ -242,7 +245,7 @@ class PartialGrowth:
         done = end >= _DONE
         self._tabulate(seen, begin, done)
         analysis.fatigue.N += cycles
-        self._set(end, done)
+        self._set(end, seen, done)
         if done.any():
             analysis.update_tips()
             event = event or "growth"
@@ -265,20 +268,28 @@ class PartialGrowth:
 
     # -- ligaments -------------------------------------------------------------------------
 
-    def _set(self, parts: Array, done: Bools | None = None) -> None:
-        """Move the fronts, and release nodes; bonds of no work at closure stay as they are."""
+    def _set(self, parts: Array, seen: list[TipCycle], done: Bools | None = None) -> None:
+        """Move the fronts, and release nodes; bonds of no work at closure stay as they are.
+
+        Args:
+            parts: Passed parts of the elements, shape (n_tips,).
+            seen: The cycle in the state from which the fronts move.
+            done: Nodes to release, shape (n_tips,).
+        """
         done = np.zeros(len(parts), dtype=bool) if done is None else done
         for i, (g, v) in enumerate(self._analysis.at_tips()):
             if len(v.tips):
-                self._set_front(g, v, self._split(parts)[i], self._split(done)[i])
+                self._set_front(g, v, seen[i], self._split(parts)[i], self._split(done)[i])
 
-    def _set_front(self, g: Crack, values: TipValues, part: Array, done: Bools) -> None:
+    def _set_front(
+        self, g: Crack, values: TipValues, seen: TipCycle, part: Array, done: Bools
+    ) -> None:
         analysis, tips = self._analysis, values.tips
         ligaments = analysis.fatigue.ligaments[g.p]
-        _, evaluator = cyclic_parts(g)
         new = np.flatnonzero((part > 0.0) & np.isnan(ligaments.stiffness[tips.node, 0]))
         if len(new):
-            measured = evaluator.measure(tips, analysis.solver.state, analysis.time)[new]
+            # loads may be out of phase: this node's rate is largest at an instant of its own
+            measured = seen.peak[new]
             good = ligaments.begin(tips, new, measured[:, :3], measured[:, 3:6])
             part = part.copy()
             part[new[~good]] = 0.0

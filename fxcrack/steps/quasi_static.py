@@ -6,6 +6,7 @@ controlled opening; increments are in :mod:`fxcrack.steps.increment_stepping`.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -14,11 +15,13 @@ import numpy as np
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.driver import BEYOND, LARGE, StepDriver
 from fxcrack.steps.increment_stepping import step_by_increments
+from fxcrack.steps.load_factor import LoadFactor
 from fxcrack.steps.release import release_critical
 from fxcrack.steps.static import Static
 
@@ -30,6 +33,8 @@ _ABOVE = 1.0 + 1e-9
 """Values of f above this are more than 1."""
 _AT_ONE = 1e-6
 """How far from 1 a search for f = 1 may end, that of nonlinear bodies included."""
+_ONE_LOAD = 1e-6
+"""Loads along a path that differ by less than this part are one, to what searches resolve."""
 
 
 def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
@@ -108,22 +113,28 @@ def step_by_events(driver: StepDriver) -> str:
 def step_along_path(driver: StepDriver) -> str:
     """Keep a proportional load on the equilibrium path at f = 1; returns why the step ended."""
     analysis = driver.analysis
-    _check_proportional(driver)
+    control = LoadFactor(driver)
+    fell = math.nan  # load at which f, coming from above, jumped over 1 since the last release
     while True:
         driver.checkpoint_point()
         reason = driver.ended()
         if reason:
             return reason
-        if analysis.largest > _ABOVE:
-            if not driver.path.to_crossing(0.0, upward=False):
-                raise InputError(
-                    "stepping='path': f stays above 1 down to zero load; check prestress"
-                )
+        down = analysis.largest > _ABOVE
+        if down:
+            if not control.fall_to_one():
+                return control.why_above()
         elif not _reached(driver) and not _load_to_event(driver):
             return driver.ended() or _never(driver)
         most = 1.0 + max(_AT_ONE, driver.path.resolution)
-        if not _reached(driver) or analysis.largest > most:
+        if down and (not _reached(driver) or analysis.largest > most):
+            fell = analysis.time
+        # faces in friction stick when the load turns back, and f with them jumps: where it does so
+        # in both directions at one load, there is no state with f = 1, and the bond goes at f > 1
+        turns = analysis.largest > most and abs(analysis.time - fell) <= _ONE_LOAD * abs(fell)
+        if not turns and (not _reached(driver) or analysis.largest > most):
             continue  # f jumped over 1 where bonds ran through unstable states, or the end came
+        fell = math.nan
         driver.record("onset")
         release_critical(analysis)
         driver.record("release")
@@ -132,8 +143,10 @@ def step_along_path(driver: StepDriver) -> str:
 def step_by_opening(driver: StepDriver) -> str:
     """Find a proportional load from an opening that never falls; returns why the step ended."""
     analysis = driver.analysis
-    _check_proportional(driver)
+    factor = LoadFactor(driver)
     control = OpeningControl(analysis.condensed, analysis.active, driver.step.monitors)
+    if factor.preloaded:
+        control.begin_at(analysis.solver.state)
     while True:
         driver.checkpoint_point()
         reason = driver.ended()
@@ -148,7 +161,7 @@ def step_by_opening(driver: StepDriver) -> str:
         release_critical(analysis)
         more = control.excess(analysis.solver.state)
         same = abs(more) <= control.close
-        if not same and not (more > 0.0 and driver.path.back_to(control.excess, control.close)):
+        if not same and not (more > 0.0 and factor.fall_back(control.excess, control.close)):
             raise InputError(
                 f"stepping='opening': nodes were released at {analysis.time:.6g} times the load, "
                 f"and '{control.name}' = {control.opening:.6g} is not found again at less; control "
@@ -206,7 +219,12 @@ def _only_round_off(driver: StepDriver) -> bool:
     energy release rate) that of the last release would bring their f, which is round-off, to 1.
     """
     analysis = driver.analysis
-    if driver.breaks or analysis.condensed.system.soft.bonds or analysis.time <= 0.0:
+    if (
+        driver.preloaded
+        or driver.breaks
+        or analysis.condensed.system.soft.bonds
+        or analysis.time <= 0.0
+    ):
         return False
     by_load = all(g.criterion.depends_on_load for g in analysis.active)
     released = any(g.n_released for g in analysis.active)
@@ -247,24 +265,13 @@ def _never(driver: StepDriver) -> str:
     return _NEVER
 
 
-def _check_proportional(driver: StepDriver) -> None:
-    """Refuse what is impossible with a load that increases and decreases."""
-    stepping = f"stepping='{driver.step.stepping}'"
-    if driver.breaks:
-        raise InputError(
-            f"{stepping} follows one proportional load; use the default amplitude for "
-            "all loads of the step"
-        )
-    analysis = driver.analysis
-    for g in analysis.active:
-        if g.evaluator.breaks() or g.debond.release.driver == "time" or analysis.ramps:
-            raise InputError(
-                f"interface '{g.title}' grows or is released with time, which {stepping} does "
-                "not have: it moves the load forth and back; use 'event' or 'increment'"
-            )
-
-
 # -- controlled opening ----------------------------------------------------------------------------
+
+
+def _fills(load: object) -> bool:
+    """Whether a load is a pressure that follows the crack."""
+    return isinstance(load, CrackPressure)
+
 
 SAME_OPENING = 1e-9
 """Openings that differ by less than this part of them are the same."""
@@ -276,7 +283,8 @@ class OpeningControl:
     Args:
         solver: The solver, with its monitors.
         cracks: Active cracks.
-        names: Name of a monitor, or of two of which the opening is the first less the second.
+        names: Name of a monitor, or of two of which the opening is the first less the second; or of
+            a pressure that follows the crack, whose volume is controlled.
 
     Attributes:
         name: What is controlled, in words.
@@ -291,11 +299,20 @@ class OpeningControl:
         self.name = " - ".join(names)
         self.opening = 0.0
         titles = [m.title for m in solver.monitors]
+        first = solver.n_loads - len(solver.loads)
+        volumes = {x.title: first + k for k, x in enumerate(solver.loads) if _fills(x)}
         self._weight = np.zeros(len(titles))
+        self._volume = np.zeros(solver.n_loads)
+        self._preloaded = False
         for name, sign in zip(names, (1.0, -1.0), strict=False):
-            if name not in titles:
-                unknown_name("monitor", name, titles)
-            self._weight[titles.index(name)] += sign
+            if name in titles:
+                self._weight[titles.index(name)] += sign
+            elif name in volumes:
+                self._volume[volumes[name]] += sign
+            else:
+                unknown_name(
+                    "monitor or pressure that follows the crack", name, [*titles, *volumes]
+                )
         if solver.system.friction is not None:
             raise InputError(
                 "stepping='opening' moves the load back at each release, and faces with friction "
@@ -312,12 +329,17 @@ class OpeningControl:
     @property
     def close(self) -> float:
         """Openings that differ by less are the same, length."""
-        return SAME_OPENING * self.opening
+        return SAME_OPENING * abs(self.opening)
+
+    def begin_at(self, state: Equilibrium) -> None:
+        """Let the opening grow from that of a state, in which constant loads act already."""
+        self._preloaded = True
+        self.opening = self.excess(state)
 
     def excess(self, state: Equilibrium) -> float:
         """What the opening of a state has over that of the last onset, length."""
         values = self._solver.system.monitors(state)[: len(self._weight)]
-        return float(self._weight @ values) - self.opening
+        return float(self._weight @ values + self._volume @ state.conjugate) - self.opening
 
     def reach(self, state: Equilibrium) -> None:
         """Control the opening of a state from now on.
@@ -326,7 +348,8 @@ class OpeningControl:
             InputError: It is not positive, or smaller than the one before.
         """
         more = self.excess(state)
-        if self.opening + more <= 0.0 or more < -self.close:
+        positive = self._preloaded or self.opening + more > 0.0
+        if not positive or more < -self.close:
             raise InputError(
                 f"stepping='opening': '{self.name}' went from {self.opening:.6g} to "
                 f"{self.opening + more:.6g} up to an onset; control a displacement that grows "

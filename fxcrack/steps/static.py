@@ -25,10 +25,13 @@ class Static:
             f = 1, also where that means unloading (snap-back under load control); "opening" finds
             the load factor of a proportional load from a monitored displacement that never falls:
             after a release the load falls until the opening is what it was, and nodes whose f is
-            still 1 or more are released at the same opening. Not with friction.
+            still 1 or more are released at the same opening. Not with friction. Beside the
+            proportional load, "path" and "opening" allow loads that are constant in the step; the
+            load factor may then become negative.
         opening: With stepping="opening", the name of the monitor that is controlled, or of two of
             which it is the first less the second, e.g. both faces at the crack mouth. It must grow
-            with the load.
+            with the load. The name of a pressure with ``follows_crack`` controls the injected
+            volume.
         initial: First increment, in time; ``maximum`` if that is smaller than the default.
             Increment stepping only, as all below but ``maximum`` (nonlinear bodies heed it always).
         minimum: Smallest increment; needing less ends the step.

@@ -36,6 +36,7 @@ def marked(name: str) -> object:
 
 
 @pytest.mark.mpi
+@pytest.mark.each
 @pytest.mark.parametrize("name", [marked(n) for n in SCENES])
 def test_history_is_what_it_was(comm: MPI.Intracomm, name: str) -> None:
     off, where = deviation(read(FOLDER / f"{name}.csv"), run(name, comm))

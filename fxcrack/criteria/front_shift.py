@@ -1,0 +1,146 @@
+"""The front a part of an element behind the tips, whose energy release rate a mesh gives.
+
+Finite elements store less energy around a tip than the crack-tip field does, by c h G per length of
+the front. The derivative of the energy they store, with the mesh carried along, is therefore
+
+    J L = G L - c h d(G L)/da = (G L)(a - c h)
+
+to the first order in the element size h, with the length L of the front. On the front that
+releasing all its nodes leads to, the same holds a length h_ahead further on, and G at the tip lies
+between both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.criteria.probe import FrontProbe, State, load_density
+from fxcrack.interface.front import Front
+from fxcrack.interface.tips import Tips
+
+_SHIFT = {
+    (False, 1): (0.29, 0.43, 0.43),
+    (False, 2): (0.0625, 0.104, 0.104),
+    (True, 1): (0.33, 0.65, 0.65),
+    (True, 2): (0.09, 0.153, 0.153),
+}
+"""c by mode, for other cells and for simplices, by the order of their displacement: J beside the
+closed form of a centre crack in a wide plate, plane strain, even spacing, 8 elements of first and 4
+of second order along half of it. Mode III is taken as mode II."""
+_FAR = 0.6
+"""A node of the next front belongs to a tip if it is nearer to its aim than this part of an
+element."""
+
+
+@dataclass(frozen=True)
+class NextFront:
+    """The front once all its nodes are released.
+
+    Attributes:
+        front: This front, the bodies undeformed.
+        tips: Its nodes.
+        opened: Nodes that were bonded before, shape (n,).
+        match: Per tip of the present front the node of the next one ahead of it, -1 where there
+            is none, shape (n_tips,).
+        here: Mean length of the elements around each tip, shape (n_tips,) [length].
+        there: Around the node ahead, likewise.
+        step: Length in between, likewise.
+        shift: c by mode, shape (3,).
+    """
+
+    front: Front
+    tips: Tips
+    opened: Ints
+    match: Ints
+    here: Array
+    there: Array
+    step: Array
+    shift: Array
+
+    @classmethod
+    def of(cls, front: Front, tips: Tips, *, simplices: bool) -> NextFront | None:
+        """The next front; ``None`` where the crack ends.
+
+        Args:
+            front: The present front, the bodies undeformed.
+            tips: Its nodes.
+            simplices: Whether the cells are triangles or tetrahedra.
+        """
+        moves = (tips.d_ahead > 0.0) & ~tips.ligament
+        opened = np.unique(tips.force_nodes[moves])
+        if not moves.all() or not len(opened):
+            return None
+        after = front.without(opened)
+        later = after.tips()
+        if not len(later):
+            return None
+        surface = front.surface
+        aim = surface.x[tips.node] + tips.d_ahead[:, None] * tips.frame[:, :, 1]
+        away = np.linalg.norm(aim[:, None] - surface.x[later.node], axis=2)
+        match = away.argmin(axis=1)
+        near = away[range(len(tips)), match] <= _FAR * tips.d_ahead
+        near &= ~later.ligament[match] & (later.d_ahead[match] > 0.0)
+        return cls(
+            after, later, opened, np.where(near, match, -1),
+            0.5 * (tips.d_ahead + tips.d_behind), 0.5 * (later.d_ahead + later.d_behind)[match],
+            tips.d_ahead, np.array(_SHIFT[simplices, surface.order]),
+        )  # fmt: skip
+
+    def weight(self, tip: int, shares: Array) -> float:
+        """Share of the next front in G at a tip.
+
+        Args:
+            tip: Which of them.
+            shares: Shares of the modes in G, shape (3,).
+        """
+        c = float(self.shift @ shares)
+        here, there = c * self.here[tip], c * self.there[tip]
+        return float(here / (self.step[tip] - there + here))
+
+    def to_open(self, tips: Tips, force: Array, probe: FrontProbe) -> tuple[Ints, Bools, Array]:
+        """What is released on the way to this front.
+
+        Args:
+            tips: The present front.
+            force: Bond forces at its force nodes in the tip frames, shape (n_tips, k, 3) [force].
+            probe: The interface.
+
+        Returns:
+            Slave nodes, shape (n,); whether their faces stay closed, since contact presses them
+            together, shape (n,); their bond forces, global vectors, shape (n, 3) [force].
+        """
+        vectors = np.einsum("nci,nki->nkc", tips.frame, force)
+        pressed = np.zeros(force.shape[:2], dtype=bool)
+        if probe.pair.interface.contact:
+            pressed[:] = force[:, :, 0].sum(axis=1, keepdims=True) <= 0.0
+        nodes, first = np.unique(tips.force_nodes, return_index=True)
+        return nodes, pressed.reshape(-1)[first], vectors.reshape(-1, 3)[first]
+
+    def to_come(self, tips: Tips, probe: FrontProbe, state: State) -> Array:
+        """Traction that the loads behind the tips will have on the facets about to open.
+
+        Zero where they are loaded already, shape (n_tips, 3).
+        """
+        if not probe.has_face_loads:
+            return np.zeros((len(tips), 3))
+        ahead = probe.face_loads(self.tips.node[self.match], state)
+        loaded = np.any(ahead, axis=1, keepdims=True)
+        return np.where(loaded, 0.0, load_density(probe, tips, state))
+
+
+def blend_to_tip(here: float, there: float, weight: float) -> float:
+    """G at a tip from the rates of the present front and of the next one, times its stretch.
+
+    A rate that is not positive, or that changes by more than itself, is no part of a smooth course:
+    the present one alone is taken.
+    """
+    if here <= 0.0 or not 0.0 < there < _MOST * here:
+        return here
+    return (1.0 - weight) * here + weight * there
+
+
+_MOST = 4.0
+"""Largest ratio of the rates of two fronts between which G is interpolated."""

@@ -1,0 +1,337 @@
+"""Makes the rings of cells around the tips of a front."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fxcrack.base import log
+from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InputError
+from fxcrack.continuum.kinematics import Axisymmetric
+from fxcrack.continuum.loads import BodyForce
+from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt_strain
+from fxcrack.criteria.crack_tip_fields import TipFields
+from fxcrack.criteria.face_tractions import FaceTractions, loads_on_faces, opened_facets
+from fxcrack.criteria.front_ring import FIELDS_DEGREE, CellGeometry, TipState, divergence_in_rings
+from fxcrack.criteria.outer_faces import node_positions, outer_faces
+from fxcrack.criteria.probe import FrontProbe
+from fxcrack.criteria.ring import Interaction, Ring
+from fxcrack.criteria.virtual_extension import Corners, FrontLine
+from fxcrack.interface.front import Front
+from fxcrack.interface.front_cells import FrontCells
+from fxcrack.interface.surface import gather_surface
+from fxcrack.interface.tips import Tips
+
+
+class RingBuilder:
+    """Makes rings; those of tips around which nothing has changed are kept.
+
+    Args:
+        probe: The interface.
+        rings: Outer radius of the ring, in lengths of the cells at the tip.
+        length: Reference length of the modes between two materials; ``None``: the length of the
+            element behind the tip, with a warning where it matters.
+    """
+
+    def __init__(self, probe: FrontProbe, rings: int, length: float | None) -> None:
+        self._probe, self._bodies = probe, probe.bodies
+        self._title = probe.pair.title
+        self._rings, self._length = rings, length
+        self._continuum = continuum = self._bodies.continuum
+        self._laws = [law_of(continuum, i) for i in range(len(continuum.part_materials))]
+        self._loads = list(self._bodies.loads)
+        self._body_forces = [k for k, x in enumerate(self._loads) if isinstance(x, BodyForce)]
+        groups = [self._loads[k].where for k in self._body_forces]
+        self._cells = self._bodies.cells_around(groups)
+        self._on_faces = loads_on_faces(continuum, self._loads)
+        self._slaves = probe.pair.surface.dofs
+        self._masters = gather_surface(continuum, probe.pair.sides[1]).dofs
+        self._ring = isinstance(continuum.model, Axisymmetric)
+        self._thickness = float(getattr(continuum.model, "thickness", 1.0))
+        self._n_modes = 2 if probe.gdim == 2 else 3
+        self._known: dict[tuple[Any, ...], Ring] = {}
+        self._said: set[str] = set()
+
+    def of(self, front: Front, tips: Tips, opened: Ints) -> list[Ring]:
+        """The rings of a front where the bodies are undeformed; collective.
+
+        Args:
+            front: The front there.
+            tips: Its nodes there.
+            opened: Nodes that were bonded and are open on this front, shape (n,); intensity factors
+                are for fronts without such nodes.
+        """
+        gdim = self._probe.gdim
+        line = FrontLine.of(front, tips)
+        pair, surface = self._probe.pair, front.surface
+        x = surface.x[tips.node]
+        here = []
+        for node in tips.node:
+            masters = pair.masters[node][np.abs(pair.weights[node]) > 1e-9]
+            here.append(np.unique(np.append(masters, surface.dofs[node])))
+        tangent = tips.frame[:, :gdim, 2] if gdim == 3 else np.zeros((len(tips), 2))
+        size = self._cells.sizes(here, x[:, :gdim], tangent)
+        size = np.maximum(size, np.maximum(tips.d_behind, tips.d_ahead))
+        # from the front, which runs between the tips
+        reach = _reach(line)
+        wide = float(np.hypot(self._rings * size.max(initial=0.0), 0.5 * reach))
+        cells = self._cells.near(x[:, :gdim], np.full(len(x), wide))
+        corners = Corners(cells, line)
+        rings, known = [], {}
+        for i in range(len(tips)):
+            key = self._key(front, tips, i, wide + reach, float(size[i]), opened)
+            ring = self._known.get(key)
+            if ring is None:
+                ring = self._make(front, tips, i, line, cells, corners, float(size[i]), opened)
+            known[key] = ring
+            rings.append(ring)
+        self._fresh = known
+        return rings
+
+    def keep(self, rings: dict[tuple[Any, ...], Ring]) -> None:
+        """Keep these rings for later fronts, and no others."""
+        self._known = rings
+
+    @property
+    def fresh(self) -> dict[tuple[Any, ...], Ring]:
+        """The rings of the last front by what they depend on."""
+        return self._fresh
+
+    def _key(
+        self, front: Front, tips: Tips, i: int, reach: float, size: float, opened: Ints
+    ) -> tuple[Any, ...]:
+        """All that the ring of a tip depends on: the front near it."""
+        x = front.surface.x
+        near = np.linalg.norm(x[tips.node] - x[tips.node[i]], axis=1) <= 2.0 * reach
+        open_near = opened[np.linalg.norm(x[opened] - x[tips.node[i]], axis=1) <= 2.0 * reach]
+        return (
+            int(tips.node[i]), tips.node[near].tobytes(), tips.frame[near].tobytes(),
+            open_near.tobytes(), len(opened) > 0, size, float(tips.d_behind[i]),
+            float(tips.width[i]),
+        )  # fmt: skip
+
+    def _make(
+        self,
+        front: Front,
+        tips: Tips,
+        i: int,
+        line: FrontLine,
+        cells: FrontCells,
+        corners: Corners,
+        size: float,
+        opened: Ints,
+    ) -> Ring:
+        """The largest ring of a tip with one material on each side, of one layer at least."""
+        size *= 1.0 + 1e-6
+        normal = tips.frame[i, :, 0]
+        origin = front.surface.x[tips.node[i]]
+        centre = np.zeros((len(cells.nodes), 3))
+        centre[:, : self._probe.gdim] = cells.corners.mean(axis=1)
+        above = (centre - origin) @ normal > 0.0
+        for layers in range(self._rings, 0, -1):
+            core = size if layers > 1 else 0.0
+            q = corners.extension(tips, i, layers * size, core)[corners.of_cell]
+            rows = np.flatnonzero(np.abs(q).max(axis=(1, 2)) > 0.0)
+            parts = [np.unique(cells.part[rows[above[rows] == side]]) for side in (True, False)]
+            # a side without cells has no material that could differ
+            alike = all(len(p) <= 1 for p in parts)
+            if alike:
+                break
+        if not len(rows):
+            raise InputError(
+                f"interface '{self._title}': method='domain' finds no cells around the tip at "
+                f"{format_point(origin)} that a growing crack would move; take method='vcct'"
+            )
+        if not alike:
+            nearest = np.linalg.norm(centre[rows] - origin, axis=1)
+            order = rows[np.argsort(nearest, kind="stable")]
+            parts = [cells.part[order[above[order] == side]][:1] for side in (True, False)]
+            self._say(
+                "materials",
+                "interface '%s': the cells at the tip at %s are of several materials on one "
+                "side; the modes of method='domain' are those of the nearest ones, its total "
+                "is right where the materials meet along the direction of growth",
+                self._title,
+                format_point(origin),
+            )
+        if not all(len(p) for p in parts):
+            parts = [p if len(p) else parts[1 - k] for k, p in enumerate(parts)]
+        return self._fill(
+            front, tips, i, line, cells.chosen(rows), q[rows], above[rows],
+            [int(p[0]) for p in parts], alike, opened,
+        )  # fmt: skip
+
+    def _fill(
+        self,
+        front: Front,
+        tips: Tips,
+        i: int,
+        line: FrontLine,
+        cells: FrontCells,
+        q: Array,
+        above: Bools,
+        parts: list[int],
+        alike: bool,
+        opened: Ints,
+    ) -> Ring:
+        """A ring of given cells and extension at their corners."""
+        continuum, gdim = self._continuum, self._probe.gdim
+        nodes, of_cell = np.unique(cells.nodes, return_inverse=True)
+        of_cell = of_cell.reshape(cells.nodes.shape)
+        x = np.zeros((len(nodes), 3))
+        x[of_cell] = node_positions(cells)
+        laws = CellLaws(self._laws, cells.part, finite=self._bodies.finite)
+        faces = FaceTractions(self._on_faces, q, cells, above, nodes, len(self._loads), gdim=gdim)
+        fields = None
+        if not len(opened):
+            length = self._length or float(tips.d_behind[i])
+            upper, lower = (self._laws[p].whole for p in parts)
+            fields = TipFields(upper, lower, tips.frame[i], length)
+            self._look_at_oscillation(fields.oscillation, length)
+        origin = front.surface.x[tips.node[i]]
+        interaction = self._interaction(fields, origin, cells, q, above, laws, faces, of_cell)
+        area = line.widths(tips, i)
+        if gdim == 2:
+            area = float(continuum.model.breadth(origin[None])[0])
+        opening = opened_facets(front.surface, front.bonded, opened, nodes, cells, q)
+        # as the bodies have it
+        plain = CellGeometry(cells, continuum.degree, ring=self._ring, thickness=self._thickness)
+        volume = plain.weight
+        shift = plain.at_corners(q) * volume[..., None]
+        rise, slope = self._temperatures(cells, plain, shift)
+        body, _ = self._body(cells, plain, shift, np.zeros((1, *volume.shape, 3, 3)))
+        return Ring(
+            nodes, of_cell, plain, x[:, :gdim], laws,
+            plain.gradient(q, corners=True) * volume[..., None, None], rise, slope, body, faces,
+            opening, interaction, area, alike,
+        )  # fmt: skip
+
+    def _interaction(
+        self,
+        fields: TipFields | None,
+        origin: Array,
+        cells: FrontCells,
+        q: Array,
+        above: Bools,
+        laws: CellLaws,
+        faces: FaceTractions,
+        of_cell: Ints,
+    ) -> Interaction:
+        """The interaction integrals; nothing where no fields are given."""
+        m, n_nodes, gdim = self._n_modes, int(of_cell.max()) + 1, self._probe.gdim
+        if fields is None:
+            none = np.zeros(0)
+            return Interaction(none, none, none, np.eye(m), 0.0)
+        thickness = self._thickness
+        # the fields of the tip are no polynomials
+        degree = max(self._continuum.degree, FIELDS_DEGREE)
+        geometry = CellGeometry(cells, degree, ring=self._ring, thickness=thickness)
+        volume = geometry.weight
+        moved = geometry.gradient(q, corners=True) * volume[..., None, None]
+        shift = geometry.at_corners(q) * volume[..., None]
+        stiffness, expansion = laws.stiffness, laws.expansion
+        rise, slope = self._temperatures(cells, geometry, shift)
+        tip = TipState.of(fields, geometry, origin, above, m)
+        stress = tensor_of_stress(tip.strain @ np.swapaxes(stiffness, 1, 2))
+        trace = np.einsum("cqii->cq", moved)
+        # s : (H_a q') - s : e_a tr q', as C : (...) : (e - alpha T)
+        turned = voigt_strain(tip.gradient @ moved)
+        turned -= tip.strain * trace[..., None]
+        turned[..., 2] += np.einsum("mcqi,cqi->mcq", tip.hoop, shift)
+        held = turned @ np.swapaxes(stiffness, 1, 2)
+        modes = tensor_of_stress(held) + stress @ np.swapaxes(moved, -1, -2)
+        if self._ring:
+            out = divergence_in_rings(stress, geometry.radius)
+            modes += out[..., :, None] * shift[..., None, :]
+        by_rise = -np.einsum("mcqi,ci,pcq->mp", held, expansion, rise)
+        pressed = np.einsum("mcqij,cij->mcq", stress, _strain_tensor(expansion))
+        by_rise += np.einsum("mcq,pcq->mp", pressed, slope)
+        _, by_load = self._body(cells, geometry, shift, tip.gradient)
+        by_load -= faces.interaction(fields, origin, m)
+        by_node = np.zeros((m, n_nodes, gdim))
+        each = geometry.weights_at_nodes(modes)
+        each += outer_faces(
+            cells, geometry, q, self._own_facets(cells), fields, origin, above, stiffness, m,
+            thickness,
+        )  # fmt: skip
+        for mode in range(m):
+            np.add.at(by_node[mode], of_cell, each[mode])
+        energy = fields.energy[:m, :m]
+        return Interaction(by_node, by_rise, by_load, energy, fields.oscillation)
+
+    def _own_facets(self, cells: FrontCells) -> Bools:
+        """Whether each facet of a cell is one of the interface, shape (n_cells, n_facets)."""
+        corners = cells.nodes[:, cells.facet_corners]
+        return np.asarray(
+            np.isin(corners, self._slaves).all(axis=2) | np.isin(corners, self._masters).all(axis=2)
+        )
+
+    def _temperatures(
+        self, cells: FrontCells, geometry: CellGeometry, shift: Array
+    ) -> tuple[Array, Array]:
+        """Patterns at the points, and their gradients times extension and volume."""
+        n = cells.temperatures.shape[1]
+        if not n:
+            empty = np.zeros((0, *geometry.weight.shape))
+            return empty, empty
+        table = self._cells.temperature_table(geometry.tables.points)
+        rise = np.einsum("qa,cpa->pcq", table, cells.temperatures)
+        slope = geometry.slope(np.moveaxis(cells.nodal_temperatures, 1, 0))
+        return rise, np.einsum("pcqi,cqi->pcq", slope, shift)
+
+    def _body(
+        self, cells: FrontCells, geometry: CellGeometry, shift: Array, tip: Array
+    ) -> tuple[Array | None, Array]:
+        """Weights of H in the work of body forces, and what they do in the interaction."""
+        by_load = np.zeros((len(tip), len(self._loads)))
+        if not self._body_forces:
+            return None, by_load
+        body = np.zeros((len(self._loads), *geometry.weight.shape, 3, 3))
+        for column, k in enumerate(self._body_forces):
+            force = np.zeros((*geometry.weight.shape, 3))
+            for axis, value in enumerate(self._loads[k].value):
+                if callable(value):
+                    flat = geometry.x.reshape(-1, 3).T
+                    force[..., axis] = np.reshape(value(flat), geometry.weight.shape)
+                else:
+                    force[..., axis] = float(value)
+            force *= cells.marks[:, column, None, None]
+            body[k] = force[..., :, None] * shift[..., None, :]
+            by_load[:, k] = -np.einsum("cqij,mcqij->m", body[k], tip)
+        return body, by_load
+
+    # -- messages ------------------------------------------------------------------------
+
+    def _say(self, what: str, words: str, *values: Any) -> None:
+        """Warn once."""
+        if what not in self._said:
+            self._said.add(what)
+            log.warn(words, *values)
+
+    def _look_at_oscillation(self, oscillation: float, length: float) -> None:
+        """Warn once where the modes depend on a length that nobody has stated."""
+        if self._length is None and oscillation:
+            self._say(
+                "length",
+                "interface '%s': the materials of its sides make the modes depend on a "
+                "reference length (oscillation index %.3g); those of method='domain' are for "
+                "%.4g, the length of the element behind the tip: give reference_length",
+                self._title,
+                oscillation,
+                length,
+            )
+
+
+def _reach(line: FrontLine) -> float:
+    """Length of the longest segment of a front."""
+    ends = line.x[line.segments]
+    return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).max(initial=0.0))
+
+
+def _strain_tensor(strain: Array) -> Array:
+    """Tensor of a Voigt strain, shape (..., 6) to (..., 3, 3)."""
+    half = np.array([1.0, 1.0, 1.0, 0.5, 0.5, 0.5])
+    return tensor_of_stress(strain * half)
