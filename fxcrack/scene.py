@@ -17,6 +17,7 @@ from fxcrack.base.together import check_same_call, in_collective_call
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint
+from fxcrack.continuum.foundation import Stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Model, Shell
 from fxcrack.continuum.loads import Displacement, Load, Monitor
@@ -70,6 +71,11 @@ class Scene:
         solver: "newton" sends a scene without such effects through the nonlinear solver all the
             same; by default the effects decide between it and "linear".
         newton: Controls of the nonlinear solver, where it is used.
+        stabilise: A weak foundation under bodies that only contact holds, so that an equilibrium
+            exists before faces touch: a small number s, or one for each of some cell groups. Its
+            stiffness per volume is s c/L^2, c the largest modulus of the materials and L the size
+            of the group. Its energy is the column ``stabilising_energy``; a warning says where it
+            is more than 1 % of the strain energy.
         path: Former name of ``solver``, deprecated; "condensed" stands for "linear".
 
     Attributes:
@@ -96,6 +102,7 @@ class Scene:
         effects: Sequence[Any] = (),
         solver: str | None = None,
         newton: NewtonOptions | None = None,
+        stabilise: Stabilise | None = None,
         path: str | None = None,
     ) -> None:
         self._n_warned = log.n_warned()
@@ -113,6 +120,7 @@ class Scene:
             effects=effects,
             solver=solver if path is None else solver_of_path(path, solver),
             newton=newton,
+            stabilise=stabilise,
         )
         given = {f.name: getattr(self.input, f.name) for f in fields(self.input)}
         check_same_call(

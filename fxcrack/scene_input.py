@@ -20,6 +20,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint, Coupling, Equation
+from fxcrack.continuum.foundation import Foundation, Stabilise, check_stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import (
     Axisymmetric,
@@ -47,6 +48,7 @@ from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
 from fxcrack.history import History
+from fxcrack.interface.locking import warn_of_locking
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
@@ -81,6 +83,7 @@ class SceneInput:
     effects: Sequence[Any] = ()
     solver: str | None = None
     newton: NewtonOptions | None = None
+    stabilise: Stabilise | None = None
 
     def __post_init__(self) -> None:
         """Check kinds and names."""
@@ -115,6 +118,8 @@ class SceneInput:
             )
         self._check_materials()
         text("Scene", "solver", self.solver, optional=True)
+        if self.stabilise is not None:
+            check_stabilise(self.stabilise)
         titles = [i.title for i in self.interfaces]
         for title in titles:
             if titles.count(title) > 1:
@@ -182,21 +187,25 @@ def compose(given: SceneInput) -> Analysis:
             others=[i for i in given.interfaces if i is not one],
             supported=supports.which,
             by_nodes=inertia or (one.contact and slides),
+            cracks=any(d.interface is one for d in given.debonds),
         )
         for one in given.interfaces
     ]
+    warn_of_locking(continuum, pairs[: len(given.debonds)])
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
     parts = continuum, pairs, supports, loads, list(given.monitors)
+    foundation = None if given.stabilise is None else Foundation(continuum, given.stabilise)
     solver: Solver
     if chosen.solver == "linear":
-        solver = LinearSolver(*parts, given.options or CondensedOptions())
+        solver = LinearSolver(*parts, given.options or CondensedOptions(), foundation)
     else:
+        terms = form_terms(continuum, given.effects, given.loads)
         solver = NewtonSolver(
             *parts,
             given.options or CondensedOptions(rows=0.0),
-            bodies=WeakForm(continuum, form_terms(continuum, given.effects, given.loads)),
+            bodies=WeakForm(continuum, terms + ([foundation] if foundation else [])),
             newton=given.newton or NewtonOptions(),
         )
     return Analysis(
@@ -207,6 +216,7 @@ def compose(given: SceneInput) -> Analysis:
         list(given.effects),
         History(given.mesh.comm),
         EnergyBalance(),
+        stabilise=given.stabilise,
     )
 
 

@@ -10,10 +10,11 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.checks import is_function, list_of
-from fxcrack.base.errors import InputError
+from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.effects import is_finite
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.set_motions import warn_of_turns
@@ -25,6 +26,7 @@ from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
 from fxcrack.steps.debond import Debond
+from fxcrack.steps.driver import held_by_contact
 from fxcrack.steps.end_conditions import CrackLength, Time
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_driver import run_explicit
@@ -61,6 +63,11 @@ def check_step(
             )
     check_criteria(step, chosen)
     if isinstance(step, Explicit):
+        if analysis.stabilise is not None:
+            raise InputError(
+                "Explicit: stabilise is for equilibria; bodies in explicit dynamics need no "
+                "supports, so leave it out"
+            )
         return
     for pair in analysis.pairs:
         if pair.interface.stiffness is not None:
@@ -137,14 +144,21 @@ def run_step(
     for g in analysis.active:
         if not len(g.tips()):
             log.warn("%s, so nothing can debond", why_no_tip(g.front))
+    _check_lengths(analysis, step)
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
     check_same_call(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
     restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
-    _prepare(analysis, restarts, may_grow, step)
+    try:
+        _prepare(analysis, restarts, may_grow, step)
+    except NotPositiveDefinite as error:
+        raise SolverError(held_by_contact(error.why)) from error
     first = len(analysis.history)
-    analysis.history.reason = restarts.finished or _drive(
-        analysis, step, restarts, progress=progress, observers=observers
-    )
+    try:
+        analysis.history.reason = restarts.finished or _drive(
+            analysis, step, restarts, progress=progress, observers=observers
+        )
+    except NotPositiveDefinite as error:
+        raise SolverError(held_by_contact(error.why)) from error
     analysis.history.details = _details(analysis)
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
@@ -152,6 +166,26 @@ def run_step(
         warn_of_turns(analysis.continuum, constraints, u.array_r.copy())
         u.destroy()
     return first
+
+
+def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None:
+    """Refuse a crack length to stop at that the crack exceeds before the step begins.
+
+    Raises:
+        InputError: It does; a length that is just reached ends the step at once, as before.
+    """
+    for end in step.ends:
+        if not isinstance(end, CrackLength):
+            continue
+        for g in analysis.active:
+            if g.debond.interface is end.interface and len(g.tips()):
+                length = g.extent.length(g.tips())
+                if length > end.length + 1e-9 * abs(length):
+                    raise InputError(
+                        f"CrackLength({end.length:g}): the crack of '{g.title}' is {length:g} long "
+                        "already; lengths count from the end of the surface at which it is open; "
+                        "give a larger one"
+                    )
 
 
 def _prepare(

@@ -54,13 +54,18 @@ def two_arms(
     model, upper, lower = two_bodies(
         (x_upper, x_lower), (y_upper, y_lower), z, cell=cell, order=order
     )
+    name_ends(model, upper, lower)
+    return model, upper, lower
+
+
+def name_ends(model: Blocks, upper: Block, lower: Block) -> None:
+    """Name the end faces of two arms, and in 3-D their sides, as :func:`two_arms` says."""
     for name, arm in (("upper", upper), ("lower", lower)):
         model.group(f"end_{name}", arm.part(x=0.0))
-        model.group(f"far_{name}", arm.part(x=length))
-        if z:
+        model.group(f"far_{name}", arm.part(x=float(arm.axes[0][-1])))
+        if arm.dim == 3:
             model.group("side_0", arm.part(z=float(arm.axes[2][0])))
             model.group("side_w", arm.part(z=float(arm.axes[2][-1])))
-    return model, upper, lower
 
 
 def bending(half_span: float, height: float, dx: float, ny: int, cell: str, order: int) -> Blocks:

@@ -82,6 +82,8 @@ class Block:
         order: 1 or 2.
         mirror: Axes along which the division into triangles or tetrahedra is mirrored.
         first: Number of the block's first node in the model.
+        layers: Names of groups of cells, and how many layers of boxes along the second axis
+            belong to each, in their order; empty where all cells are one group.
     """
 
     axes: tuple[Floats, ...]
@@ -89,6 +91,7 @@ class Block:
     order: int
     mirror: tuple[int, ...] = ()
     first: int = 0
+    layers: tuple[tuple[str, int], ...] = ()
 
     @property
     def dim(self) -> int:
@@ -112,6 +115,17 @@ class Block:
     def cells(self) -> Ints:
         """Nodes of the cells in gmsh order, numbered in the model, shape (n_cells, n_nodes)."""
         return self._rows(self.cell, self._boxes(), {})
+
+    def cell_groups(self, name: str) -> dict[str, Ints]:
+        """Nodes of the cells of each group; of all cells as group ``name`` without layers."""
+        if not self.layers:
+            return {name: self.cells()}
+        found, start = {}, 0
+        for group, n in self.layers:
+            chosen = [None, np.arange(start, start + n), *[None] * (self.dim - 2)]
+            found[group] = self._rows(self.cell, self._boxes(chosen), {})
+            start += n
+        return found
 
     def part(self, **at: float) -> tuple[str, Ints]:
         """The facets, edges or nodes where coordinates have given values.
@@ -186,8 +200,9 @@ class Blocks:
         cell: str,
         order: int,
         mirror: tuple[int, ...] = (),
+        layers: tuple[tuple[str, int], ...] = (),
     ) -> Block:
-        """Add a block whose cells are the group ``name``.
+        """Add a block whose cells are the group ``name``, or those of its layers.
 
         Raises:
             MeshError: A cell shape or order that does not exist in this dimension.
@@ -199,7 +214,7 @@ class Blocks:
             )
         first = sum(int(np.prod(b.shape)) for b in self.blocks.values())
         lines = tuple(np.asarray(x, dtype=float) for x in axes)
-        self.blocks[name] = Block(lines, cell, order, mirror, first)
+        self.blocks[name] = Block(lines, cell, order, mirror, first, layers)
         return self.blocks[name]
 
     def group(self, name: str, *parts: tuple[str, Ints]) -> None:
@@ -209,15 +224,19 @@ class Blocks:
     def write(self, model: Any) -> None:
         """Put blocks and groups into the current gmsh model."""
         order = 1
-        for tag, (name, block) in enumerate(self.blocks.items(), 1):
+        tag = 0
+        for name, block in self.blocks.items():
             order = block.order
             points = block.points()
-            model.addDiscreteEntity(block.dim, tag)
             nodes = 1 + block.first + np.arange(len(points))
-            model.mesh.addNodes(block.dim, tag, nodes, points.ravel())
             kind = _SHAPES[block.cell][1 + order]
-            model.mesh.addElementsByType(tag, kind, [], 1 + block.cells().ravel())
-            model.addPhysicalGroup(block.dim, [tag], name=name)
+            for i, (group, cells) in enumerate(block.cell_groups(name).items()):
+                tag += 1
+                model.addDiscreteEntity(block.dim, tag)
+                if i == 0:  # all groups of a block share its nodes
+                    model.mesh.addNodes(block.dim, tag, nodes, points.ravel())
+                model.mesh.addElementsByType(tag, kind, [], 1 + cells.ravel())
+                model.addPhysicalGroup(block.dim, [tag], name=group)
         for name, parts in self.groups.items():
             tags = []
             for shape, rows in parts:

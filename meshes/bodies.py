@@ -16,6 +16,7 @@ def two_bodies(
     *,
     cell: str,
     order: int,
+    layers: tuple[tuple[tuple[str, int], ...], tuple[tuple[str, int], ...]] = ((), ()),
 ) -> tuple[Blocks, Block, Block]:
     """Bodies above and below y = 0, with the groups every specimen has.
 
@@ -28,13 +29,15 @@ def two_bodies(
         z: Coordinates along the front, one array or none for a 2-D mesh (length).
         cell: Shape of the cells.
         order: 1 or 2.
+        layers: Groups of cells of the upper and of the lower body instead of ``upper`` and
+            ``lower``: names and numbers of layers of cells, from their lowest upwards.
 
     Returns:
         The model, the upper and the lower block.
     """
     model = Blocks()
-    upper = model.add("upper", (x[0], y[0], *z), cell, order)
-    lower = model.add("lower", (x[1], y[1], *z), cell, order, mirror=(1,))
+    upper = model.add("upper", (x[0], y[0], *z), cell, order, (), layers[0])
+    lower = model.add("lower", (x[1], y[1], *z), cell, order, (1,), layers[1])
     model.group("upper_face", upper.part(y=0.0))
     model.group("lower_face", lower.part(y=0.0))
     model.group("top", upper.part(y=float(upper.axes[1][-1])))

@@ -20,6 +20,7 @@ _KINDS: dict[str, dict[str, Any]] = {
     "str": {"type": str},
     "float | None": {"type": float},
     "int | None": {"type": int},
+    "Sequence[float]": {"type": float, "nargs": "+"},
     "tuple[float, float] | None": {"type": float, "nargs": 2},
 }
 

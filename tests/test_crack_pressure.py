@@ -133,10 +133,12 @@ def test_bonded_faces_do_not_feel_it(lower: dict[str, Any]) -> None:
     whole = arms(fluid, fx.CriticalStress(1e9, distance=0.4), 1.0)
     history = whole.run(fx.Static(until=fx.Time(1.0)), progress=False)
     assert abs(history.rows[-1]["R[far_upper.y]"]) < 1e-9
-    with whole.analysis.solver.displacement() as u:
+    vector = whole.analysis.solver.displacement()
+    with vector as u:
         x, value = whole.analysis.continuum.positions(), np.abs(u).reshape(-1, 2)
         far = value[x[: len(value), 0] > 10.0].max()
         assert value.max() > 0.0 and far < 1e-5 * value.max()
+    vector.destroy()
 
 
 def test_stress_ahead_of_the_tip_is_that_of_the_bond() -> None:

@@ -217,7 +217,7 @@ def test_bodies_begin_with_a_velocity(tmp_path):
     deck.scene.close()
 
 
-def test_a_body_without_interfaces_flies(tmp_path):
+def test_a_body_without_interfaces_moves_freely(tmp_path):
     text = MOVING + "*STEP, NLGEOM=NO\n*DYNAMIC, EXPLICIT\n, 0.1\n*END STEP\n"
     deck = fx.read_deck(write(tmp_path, text))
     assert deck.run().rows[-1]["kinetic_energy"] == pytest.approx(0.5 * 8.0 * 9.0, rel=1e-10)

@@ -362,7 +362,7 @@ def test_front_in_space_releases_the_energy() -> None:
             crack = scene.cracks[0]
             values = crack.evaluate(crack.tips(), scene.solver.state, scene.time)
             rates = sum(values.report[f"G{mode}"] for mode in ("I", "II", "III"))
-            # corner nodes have hats along the front, midside nodes the mean of both beside them
+            # corner nodes have linear functions along the front, midside nodes the mean of both
             z = scene.pairs[0].surface.x[values.tips.node, 2]
             share = {0.0: 1.25, 2.5: 2.5, 5.0: 1.25}
             width = np.array([share.get(float(np.round(v, 6)), 0.0) for v in z])

@@ -12,6 +12,7 @@ from test_criteria_in_analysis import assert_balanced, plate, run
 
 import fxcrack as fx
 from fxcrack.continuum.loads import Field
+from fxcrack.demos import dcb as demo
 from fxcrack.meshes.dcb import dcb_2d
 
 PRESSED = [fx.Displacement("bottom", x=0.0, y=0.0), fx.Displacement("top", x=0.0, y=-1.0)]
@@ -191,3 +192,14 @@ def test_rows_where_amplitudes_bend() -> None:
     scene = specimen(dcb_2d(length=60.0, dx=1.0, ny=2), supports=pins)
     to_the_peak = scene.run(fx.Static(until=fx.Time(1.0)))
     assert [r["event"] for r in to_the_peak if r["time"] == 1.0] == ["end"]
+
+
+def test_a_crack_that_is_longer_already_cannot_be_told_to_stop_there():
+    scene, bond = demo.make_scene(1.0, 2)
+    with pytest.raises(fx.InputError, match=r"CrackLength\(20\): .* 30 long already"):
+        scene.run(fx.Static(until=fx.CrackLength(bond, 20.0)), progress=False)
+    scene.run(fx.Static(until=fx.CrackLength(bond, 31.0)), progress=False)
+    # a length that is just reached is no mistake: the step ends at once
+    history = scene.run(fx.Static(until=fx.CrackLength(bond, 31.0)), progress=False)
+    assert history["a[bond]"][-1] == pytest.approx(31.0)
+    scene.close()

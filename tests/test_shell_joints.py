@@ -100,8 +100,9 @@ def test_rigid_motion(comm: MPI.Intracomm, angle: float) -> None:
     history = solved(scene)
     q = scene.continuum.layout.by_node(fx.displacement_function(scene).x.array)
     x = scene.continuum.positions()
-    assert np.abs(q[:, :3] - moved(x.T).T).max(initial=0.0) < 1e-10
-    assert abs(history["strain_energy"][-1]) < 1e-12
+    # round-off of displacements of 0.1, and of energies beside E t area (1e-3)^2 = 1.4
+    assert np.abs(q[:, :3] - moved(x.T).T).max(initial=0.0) < 1e-8
+    assert abs(history["strain_energy"][-1]) < 1e-9
 
 
 def test_box_corner(comm: MPI.Intracomm) -> None:
@@ -137,7 +138,7 @@ def test_box_corner(comm: MPI.Intracomm) -> None:
             fx.Rotation("floor_a1", x=turn[0], y=turn[1], z=turn[2]),
         ],
     )
-    assert abs(solved(scene)["strain_energy"][-1]) < 1e-11
+    assert abs(solved(scene)["strain_energy"][-1]) < 1e-9
 
 
 def _frame_of_bars(force: float, stiffness: float) -> Array:

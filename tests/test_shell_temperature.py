@@ -20,7 +20,6 @@ ELEMENTS = {"Q1": ("quadrilateral", 1), "T1": ("triangle", 1), "Q2": ("quadrilat
 ALLOY = fx.Isotropic(70e3, 0.3, expansion=2.3e-5)
 STEEL = fx.Isotropic(210e3, 0.0, expansion=1.2e-5)
 BRASS = fx.Isotropic(100e3, 0.0, expansion=1.9e-5)
-NEWTON = fx.NewtonOptions(balance=1e-6)
 
 
 def plate(
@@ -71,9 +70,9 @@ def test_gradient_over_the_thickness(comm: MPI.Intracomm, kind: str, solver: str
     shell.temperature.set(1.0)
     found = shell_stress(shell, fx.displacement_function(scene).x.array)[0]
     held = 70e3 * t * 2.3e-5 * 15.0 / 0.7
-    assert np.abs(found.forces).max(initial=0.0) < 1e-9 * held
-    assert np.abs(found.faces).max(initial=0.0) < 1e-9 * held / t
-    assert abs(history["strain_energy"][-1]) < 1e-12 * held
+    assert np.abs(found.forces).max(initial=0.0) < 1e-8 * held
+    assert np.abs(found.faces).max(initial=0.0) < 1e-8 * held / t
+    assert abs(history["strain_energy"][-1]) < 1e-9 * held
     assert abs(history["balance"][-1]) < 1e-9
 
 

@@ -23,7 +23,7 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import SolverError
 from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF, mumps_message
-from fxcrack.condensation.rigid_motions import motions_of, ways
+from fxcrack.condensation.rigid_motions import held_dofs, motions_of, ways
 from fxcrack.continuum.bodies import Bodies
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.nodes import InterfaceNodes
@@ -99,7 +99,7 @@ class FreeBodies:
     def _at_supports(self, motions: Array, supports: Supports) -> Array:
         """Reduced equations of supports, shape (count, n_motions, n_motions)."""
         layout, m = self._continuum.layout, self._m
-        dofs = np.flatnonzero(supports.which >= 0)
+        dofs = held_dofs(self._continuum, supports)
         body = self._bodies.of_node[dofs // layout.n_unknowns]
         mine = np.zeros((self._bodies.count, m, m))
         for b in np.unique(body):

@@ -63,6 +63,15 @@ def motions_of(continuum: Continuum, body: Ints, centre: Array, size: Array) -> 
     return np.stack(motions, axis=1)
 
 
+def held_dofs(continuum: Continuum, supports: Supports) -> Ints:
+    """Owned dofs that supports or a foundation hold, sorted."""
+    held = supports.which >= 0
+    nodes, layout = continuum.weakly_held, continuum.layout
+    for i in range(layout.n_unknowns if len(nodes) else 0):
+        held[layout.dof(nodes, i)] = True
+    return np.flatnonzero(held)
+
+
 def check_held(continuum: Continuum, supports: Supports) -> None:
     """Refuse a model that can move as a whole; collective.
 
@@ -70,7 +79,7 @@ def check_held(continuum: Continuum, supports: Supports) -> None:
         SolverError: It can.
     """
     motions = rigid_motions(continuum)
-    held = motions[supports.which >= 0]
+    held = motions[held_dofs(continuum, supports)]
     if supports.following is not None:
         held = np.concatenate([held, supports.following.residual(continuum.layout, motions)])
     triangles = continuum.comm.allgather(np.linalg.qr(held, mode="r"))

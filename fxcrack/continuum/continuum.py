@@ -68,6 +68,9 @@ class Continuum:
         shell_cells: Cells of the parts that are continuum shells, by number of the part.
         tied_cells: Of those, the parts of first order: no UFL form of ``parts`` has their strains.
         temperature: The temperature on this mesh, ``None`` where there is none.
+        weakly_held: Owned nodes that a foundation (:mod:`fxcrack.continuum.foundation`) holds,
+            shape (n,).
+        founded: Whether a foundation holds any body, on all ranks.
 
     Raises:
         InputError: The model does not fit the mesh, or the materials do not cover it once.
@@ -129,6 +132,8 @@ class Continuum:
             self.temperature = TemperatureField(mesh.domain, self.order, temperature)
         for material in materials.values() if isinstance(materials, Mapping) else [materials]:
             self.check_material(material)
+        self.weakly_held: Ints = np.zeros(0, dtype=np.int64)
+        self.founded = False
         self.part_materials: list[Material] = []
         self.part_cells: list[Ints] = []
         self.shell_cells: dict[int, ShellCells] = {}

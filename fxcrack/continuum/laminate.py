@@ -23,10 +23,8 @@ import numpy as np
 from fxcrack.base.arrays import Array
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.lay_up import angles_of
-from fxcrack.continuum.materials import Material, frame_axes, strain_rotation
+from fxcrack.continuum.materials import Frame, Material, directions, frame_axes, strain_rotation
 from fxcrack.continuum.temperature import ByTemperature, expansion_of
-
-Frame = tuple[tuple[float, float, float], tuple[float, float, float]]
 
 _IN, _OUT = [0, 1, 5], [2, 3, 4]
 """Components in the plane of the plies and those across it."""
@@ -106,8 +104,9 @@ class Laminate:
         thickness: Thickness of a ply that is given by its angle alone, length.
         frame: Used as the material of solid cells: two global direction vectors, of axis 1 of the
             laminate and of one in the plane of axes 1 and 2; plies are stacked along their cross
-            product. By default axes 1, 2, 3 are x, y, z. Shells and continuum shells have
-            their own axes and take no notice of it.
+            product. By default axes 1, 2, 3 are x, y, z; ("x", -90.0) turns them about x, so that
+            plies are stacked along y. Shells and continuum shells have their own axes and take
+            no notice of it.
 
     Attributes:
         plies: The plies, each with its material, bottom first.
@@ -146,8 +145,7 @@ class Laminate:
             raise InputError("Laminate: there is no ply; give one or more, bottom first")
         stack = tuple(_as_ply(i, p, material, thickness) for i, p in enumerate(given))
         object.__setattr__(self, "plies", stack)
-        object.__setattr__(self, "frame", frame)
-        frame_axes("Laminate", frame)
+        object.__setattr__(self, "frame", directions("Laminate", frame))
 
     # -- the stack --------------------------------------------------------------------------------
 
@@ -155,6 +153,11 @@ class Laminate:
     def thickness(self) -> float:
         """Thickness of the whole stack, length."""
         return float(sum(p.thickness for p in self.plies))
+
+    @property
+    def thicknesses(self) -> tuple[float, ...]:
+        """Thicknesses of the plies, bottom first, length."""
+        return tuple(p.thickness for p in self.plies)
 
     @property
     def angles(self) -> tuple[float, ...]:

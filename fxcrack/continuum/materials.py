@@ -20,11 +20,16 @@ from fxcrack.base.checks import (
     keep_floats,
     list_of,
     not_negative,
+    number,
     numbers,
     positive,
     shown,
 )
 from fxcrack.base.errors import InputError
+
+Vector = tuple[float, float, float]
+Frame = tuple[Vector, Vector] | float | tuple[str, float]
+"""Two directions, or an angle in degrees about z or a named axis."""
 
 
 class Material(Protocol):
@@ -85,7 +90,8 @@ class Orthotropic:
         nu: Poisson's ratios (nu12, nu13, nu23); nu_ij/E_i = nu_ji/E_j.
         G: Shear moduli (G12, G13, G23), force/length^2.
         frame: Two global direction vectors, of axis 1 and of one in the plane of axes 1 and 2;
-            the default puts axes 1, 2, 3 along x, y, z.
+            the default puts axes 1, 2, 3 along x, y, z. Or an angle in degrees by which they are
+            turned from there about z, or about another axis, ("y", 45.0), by the right-hand rule.
         expansion: Thermal strains per degree along axes 1, 2, 3, 1/temperature.
         density: Mass per volume; ``None`` where inertia plays no part.
     """
@@ -93,10 +99,7 @@ class Orthotropic:
     E: tuple[float, float, float]
     nu: tuple[float, float, float]
     G: tuple[float, float, float]
-    frame: tuple[tuple[float, float, float], tuple[float, float, float]] = (
-        (1.0, 0.0, 0.0),
-        (0.0, 1.0, 0.0),
-    )
+    frame: Frame = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
     expansion: tuple[float, float, float] = (0.0, 0.0, 0.0)
     density: float | None = None
 
@@ -119,7 +122,7 @@ class Orthotropic:
                 f"Orthotropic: nu = {self.nu} with E = {self.E} is no stable material "
                 "(compliance not positive definite); check the order nu12, nu13, nu23"
             )
-        keep(self, frame=_checked_frame("Orthotropic", self.frame))
+        keep(self, frame=directions("Orthotropic", self.frame))
         expansion = numbers("Orthotropic", "expansion", self.expansion, 3, words="one per axis")
         keep(self, expansion=expansion)
         _check_density("Orthotropic", self.density)
@@ -159,7 +162,8 @@ def frame_axes(name: str, frame: object) -> Array:
 
     Args:
         name: Whose frame it is, for messages.
-        frame: Global directions of axis 1 and of a vector in the plane of axes 1 and 2.
+        frame: Global directions of axis 1 and of a vector in the plane of axes 1 and 2, or an
+            angle.
 
     Returns:
         Rows are axes 1, 2, 3 in global components, shape (3, 3).
@@ -167,7 +171,7 @@ def frame_axes(name: str, frame: object) -> Array:
     Raises:
         InputError: They are not two vectors of three numbers, or they are parallel.
     """
-    e1, in_plane = (_unit(np.asarray(v)) for v in _checked_frame(name, frame))
+    e1, in_plane = (_unit(np.asarray(v)) for v in directions(name, frame))
     e3 = np.cross(e1, in_plane)
     e3 /= np.linalg.norm(e3)
     return np.vstack([e1, np.cross(e3, e1), e3])
@@ -178,13 +182,39 @@ def _check_density(name: str, density: object) -> None:
         positive(name, density=density)
 
 
-def _checked_frame(owner: str, frame: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Two direction vectors as tuples, neither zero nor parallel."""
+def directions(owner: str, frame: object) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """The two direction vectors that a frame stands for, neither zero nor parallel.
+
+    Args:
+        owner: Whose frame it is, for messages.
+        frame: Two vectors, an angle in degrees about z, or the name of an axis and an angle.
+
+    Raises:
+        InputError: It is none of these.
+    """
     rows = list_of(frame)
+    named = rows is not None and len(rows) == 2 and isinstance(rows[0], str)
+    if as_float(frame) is not None or named:
+        axis, angle = ("z", frame) if rows is None else rows
+        if axis not in ("x", "y", "z"):
+            raise InputError(
+                f"{owner}: frame = {shown(frame)}: the axis of the angle must be 'x', 'y' or 'z'"
+            )
+        finite(f"{owner}: frame", angle=angle)
+        turn = np.radians(number(f"{owner}: frame", "angle", angle))
+        k = "xyz".index(axis)
+        axes = np.eye(3)
+        # exact where the angle is a multiple of 90 degrees
+        c, s = (round(v) if abs(v - round(v)) < 1e-15 else v for v in (np.cos(turn), np.sin(turn)))
+        i, j = (k + 1) % 3, (k + 2) % 3
+        turned = axes.copy()
+        turned[i], turned[j] = c * axes[i] + s * axes[j], c * axes[j] - s * axes[i]
+        return tuple(turned[0].tolist()), tuple(turned[1].tolist())
     if rows is None or len(rows) != 2 or any(len(list_of(row) or ()) != 3 for row in rows):
         raise InputError(
             f"{owner}: frame = {shown(frame)} must be two direction vectors of three components "
-            "each, axis 1 and one in the plane of axes 1 and 2"
+            "each, axis 1 and one in the plane of axes 1 and 2, or an angle in degrees, 45.0 "
+            "about z or ('y', 45.0)"
         )
     try:
         first, second = (numbers("vector", f"{i}", row, 3) for i, row in enumerate(rows))

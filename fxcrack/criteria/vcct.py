@@ -37,7 +37,11 @@ class VCCT(RateCriterion):
             :class:`~fxcrack.criteria.mixed_mode.FunctionLaw`. Needed as soon as GIIc or GIIIc is
             given. Without them f = G_T/GIc.
         tolerance: f_tol; growth is accepted while 1 <= f <= 1 + f_tol.
-        method: "vcct", or "closure": the exact energy of releasing the node.
+        method: "vcct"; "closure": the exact energy of releasing the node; or "domain": an integral
+            over a ring of cells around the tip (:mod:`~fxcrack.criteria.domain_integral`).
+        rings: Outer radius of that ring, in lengths of the cells at the tip.
+        reference_length: Length to which the modes of method="domain" belong between two
+            materials [length].
         normalisation: Length VCCT divides by, see :func:`energy_release_rates`.
         unstable_tolerance: f_tol of unstable growth: several nodes may debond at one load
             while 1 + tolerance <= f <= 1 + unstable_tolerance. None: off; math.inf: unlimited.

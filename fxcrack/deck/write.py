@@ -127,6 +127,8 @@ class _Writer:
     def lines(self, steps: Sequence[Static | Cycles | Explicit | DeckStep]) -> list[str]:
         """The whole deck."""
         given = self.scene.input
+        if given.stabilise is not None:
+            refuse("the argument stabilise of the scene")
         if given.order is not None and given.order != self.scene.mesh.order:
             refuse(
                 f"a displacement of order {given.order} on elements of order "

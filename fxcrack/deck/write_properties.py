@@ -9,7 +9,14 @@ import numpy as np
 
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.materials import Isotropic, Material, NeoHookean, Orthotropic, Plastic
+from fxcrack.continuum.materials import (
+    Isotropic,
+    Material,
+    NeoHookean,
+    Orthotropic,
+    Plastic,
+    directions,
+)
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.criteria import (
     BK,
@@ -81,7 +88,7 @@ def material_lines(
         assert isinstance(first, Orthotropic)
         orientation = [
             f'*ORIENTATION, NAME="{title}"',
-            _row([*first.frame[0], *first.frame[1]]),
+            _row([x for direction in directions("Orthotropic", first.frame) for x in direction]),
         ]
     else:
         raise InputError(f"write_deck: material {material}: a deck has no word for it")

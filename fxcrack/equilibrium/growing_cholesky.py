@@ -208,7 +208,9 @@ class GrowingCholesky:
         """
         tile, info = lapack.dpotrf(star, lower=1, clean=1)
         if info > 0:
-            raise NotPositiveDefinite(int(extra[info - 1]))
+            every = np.concatenate([self.free, extra])
+            why = "" if self.restraint is None else self.restraint.find(every)
+            raise NotPositiveDefinite(int(extra[info - 1]), why)
         pivots = np.diagonal(tile) ** 2
         round_off = np.broadcast_to(self.round_off, len(self._matrix))
         zero = np.maximum(self._floor * self._matrix[extra, extra], round_off[extra])

@@ -110,7 +110,7 @@ def surface_weights(
 def _dual_basis(slave: FacetSurface) -> Array:
     """Functions with positive integrals, as combinations of the shape functions, shape (k, k)."""
     basis = np.eye(slave.facets.shape[1])
-    if _has_hats(slave):
+    if _has_linear_corners(slave):
         for middle, ends in _MIDSIDE.items():
             basis[list(ends), middle] = 0.5
     return basis
@@ -120,14 +120,14 @@ _MIDSIDE = {3: (1, 2), 4: (0, 2), 5: (0, 1)}
 """Midside nodes of a second-order triangle and the corners beside them."""
 
 
-def _has_hats(surface: FacetSurface) -> bool:
+def _has_linear_corners(surface: FacetSurface) -> bool:
     """Whether corners have first-order functions in the dual basis."""
     return surface.kind == "triangle" and surface.order == 2
 
 
 def _nodal(slave: FacetSurface, matrix: sp.csr_matrix, whole: Bools) -> tuple[sp.csr_matrix, Bools]:
     """Weights of displacements of nodes from those of the functions of :func:`_dual_basis`."""
-    if not _has_hats(slave):
+    if not _has_linear_corners(slave):
         return matrix, whole
     rows, columns = [], []
     for middle, ends in _MIDSIDE.items():

@@ -154,16 +154,16 @@ def _cut_polygons(
     first = first - np.einsum("nc,nc->n", first, normal)[:, None] * normal
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     axes = np.stack([first, np.cross(normal, first)], axis=1)
-    knife = _counterclockwise(np.einsum("nkc,nac->nka", corners - origin[:, None], axes))
+    window = _counterclockwise(np.einsum("nkc,nac->nka", corners - origin[:, None], axes))
     polygon = _counterclockwise(np.einsum("nkc,nac->nka", others - origin[:, None], axes))
-    polygon, count = clip(polygon, knife)
+    polygon, count = clip(polygon, window)
     # fans of triangles from the first corner
     n, width = polygon.shape[:2]
     base = np.broadcast_to(polygon[:, :1], (n, width - 2, 2))
     one, two = polygon[:, 1:-1] - base, polygon[:, 2:] - base
     double = one[..., 0] * two[..., 1] - one[..., 1] * two[..., 0]
     double[np.arange(1, width - 1)[None] >= (count - 1)[:, None]] = 0.0
-    large = double > _SLIVER * 2.0 * _area(knife)[:, None]
+    large = double > _SLIVER * 2.0 * _area(window)[:, None]
     which, j = np.nonzero(large)
     rule = basix.make_quadrature(basix.CellType.triangle, _degree(slave, master))
     xi, weight = np.asarray(rule[0]), np.asarray(rule[1])
@@ -186,26 +186,26 @@ def _counterclockwise(polygon: Array) -> Array:
     return np.where((_area(polygon) < 0.0)[:, None, None], polygon[:, ::-1], polygon)
 
 
-def clip(polygon: Array, knife: Array) -> tuple[Array, Ints]:
+def clip(polygon: Array, window: Array) -> tuple[Array, Ints]:
     """Parts of polygons inside others, all pairs at once.
 
     Args:
         polygon: Corners of convex polygons, shape (n, k, 2).
-        knife: Corners of the convex polygons to keep inside of, to the left, shape (n, j, 2).
+        window: Corners of the convex polygons to keep inside of, to the left, shape (n, j, 2).
 
     Returns:
         Corners of the parts in order, shape (n, k + j, 2), of which the first ``count`` are
         valid; and count, shape (n,), 0 where nothing is left.
     """
     n, k = polygon.shape[:2]
-    width = k + knife.shape[1]
+    width = k + window.shape[1]
     out = np.zeros((n, width, 2))
     out[:, :k] = polygon
     count = np.full(n, k)
     columns = np.arange(width)
-    for edge in range(knife.shape[1]):
-        start = knife[:, edge, None]
-        along = knife[:, (edge + 1) % knife.shape[1], None] - start
+    for edge in range(window.shape[1]):
+        start = window[:, edge, None]
+        along = window[:, (edge + 1) % window.shape[1], None] - start
         away = out - start
         side = along[..., 0] * away[..., 1] - along[..., 1] * away[..., 0]
         valid = columns < count[:, None]

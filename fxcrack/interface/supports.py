@@ -38,12 +38,14 @@ class SupportColumn:
         scale: Prescribed displacement at amplitude 1 where it is the same on all dofs; the column
             then holds ones, its coordinate is a displacement and its conjugate the reaction.
             1 where it varies: the coordinate is the amplitude.
+        largest: Largest prescribed displacement at amplitude 1 on any of its dofs, where known.
     """
 
     title: str
     support: AnySupport
     moves: bool
     scale: float
+    largest: float = 0.0
 
     def coordinate(self, time: float) -> float:
         """Value of the column's coordinate at a time."""
@@ -194,7 +196,8 @@ def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Su
                 )
             moves = low != 0.0 or high != 0.0
             scale = high if moves and low == high else 1.0
-            columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale))
+            largest = max(abs(low), abs(high))
+            columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale, largest))
     raise_on_all_ranks(continuum.comm, problem)
     _share_at_joints(layout, which, value, columns)
     for i, column in enumerate(columns):
@@ -345,7 +348,7 @@ def _symmetric_normal(pair: Pair, node: int, axes: list[Array]) -> Array:
         node: Slave node.
         axes: Directions in which supports hold the node, each of shape (gdim,).
     """
-    surface = pair.surface
+    surface = pair.whole_surface
     normal = pair.frames[node, :, 0]
     around = np.unique(surface.facets[(surface.facets == node).any(axis=1)])
     turn = np.linalg.norm(surface.normals[around] - surface.normals[node], axis=1).max()
@@ -370,11 +373,16 @@ def _with_normal(frame: Array, normal: Array) -> Array:
 
 
 def _moves_alike(a: SupportColumn, b: SupportColumn, at_a: float, at_b: float) -> bool:
-    """Whether two prescribed dofs always have the same displacement."""
+    """Whether two prescribed dofs always have the same displacement, but for round-off.
+
+    A function of position gives values at nodes whose coordinates differ by round-off; where it
+    passes through zero they are equal only beside its largest value.
+    """
     one, other = (c.scale * at if c.moves else 0.0 for c, at in ((a, at_a), (b, at_b)))
-    if one == other == 0.0:
+    round_off = 1e-12 * max(a.largest, b.largest, abs(one))
+    if max(abs(one), abs(other)) <= round_off:
         return True
-    return a.support.amplitude == b.support.amplitude and abs(one - other) <= 1e-12 * abs(one)
+    return a.support.amplitude == b.support.amplitude and abs(one - other) <= round_off
 
 
 def check_slaves(
@@ -413,7 +421,9 @@ def check_slaves(
                 raise InterfaceError(
                     f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
                     f"'{seen[dof]}' and of '{pair.title}'; a node can be a slave only once: "
-                    "let the surfaces end before each other or exchange slave and master of one"
+                    "where surfaces meet at an angle, exchange slave and master of one; those that "
+                    "continue each other are one interface: mesh.joined('whole', ['first', "
+                    "'second']) for either side, with toughness and friction by position"
                 )
             seen[dof] = pair.title
         slave = nodes.find(pair.surface.dofs)

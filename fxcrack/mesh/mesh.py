@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.mesh
@@ -77,6 +78,42 @@ class Mesh:
     def order(self) -> int:
         """Order of the geometry, 1 or 2."""
         return int(compat.coordinate_map(self.domain).degree)
+
+    def joined(self, name: str, parts: Sequence[str]) -> Mesh:
+        """The same mesh with a further group that holds what some groups of one dimension hold.
+
+        Surfaces that share a node or a line at their ends so become one surface, on which a crack
+        passes from the one to the other; their toughness is a function of position there.
+
+        Args:
+            name: Name of the further group.
+            parts: Names of the groups.
+
+        Returns:
+            A mesh on the same DOLFINx mesh.
+
+        Raises:
+            MeshError: There are no parts, a name is unknown or taken, or dimensions differ.
+        """
+        if not parts or isinstance(parts, str):
+            raise MeshError(f"joined('{name}'): give a list of names of groups, ['west', 'east']")
+        if name in self.groups:
+            raise MeshError(f"mesh '{self.name}' has a group '{name}' already; give another name")
+        found = [self.group(parts[0]), *(self.group(p) for p in parts[1:])]
+        if len({g.dim for g in found}) > 1:
+            each = ", ".join(f"'{p}' {g.dim}" for p, g in zip(parts, found, strict=True))
+            raise MeshError(
+                f"joined('{name}'): the groups have different dimensions ({each}); join facets "
+                "with facets, cells with cells"
+            )
+        entities = np.unique(np.concatenate([g.entities for g in found]))
+        points = None
+        if any(g.points is not None for g in found):
+            raise MeshError(
+                f"joined('{name}'): groups of nodes with midside nodes cannot be joined"
+            )
+        group = Group(found[0].dim, entities.astype(np.int32), points)
+        return replace(self, groups={**self.groups, name: group})
 
     def group(self, name: str, *, dim: int | None = None) -> Group:
         """The group called ``name``.

@@ -56,6 +56,7 @@ def fingerprint(analysis: Analysis, step: Any, grow: list[bool]) -> dict[str, An
         "model": plain(continuum.model),
         "solver": analysis.plan.solver,
         "effects": plain(analysis.effects),
+        **({"stabilise": plain(analysis.stabilise)} if analysis.stabilise is not None else {}),
         "supports": [plain(c.support) for c in solver.supports.columns]
         + [plain(c) for c in solver.supports.constraints],
         "loads": plain(solver.loads),

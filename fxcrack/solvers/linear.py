@@ -23,6 +23,7 @@ from fxcrack.condensation.options import CondensedOptions
 from fxcrack.condensation.retained import ColumnCost, CostModel
 from fxcrack.condensation.rigid_motions import check_held
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.foundation import ENERGY, Foundation
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
@@ -51,6 +52,7 @@ class LinearSolver(InterfaceSolver):
         loads: Force patterns; those of a temperature come last.
         monitors: Monitored displacements.
         options: How to condense.
+        foundation: What holds bodies that only contact would hold, if anything.
 
     Attributes:
         stiffness: K, once assembled.
@@ -67,8 +69,10 @@ class LinearSolver(InterfaceSolver):
         loads: list[Load],
         monitors: list[Monitor],
         options: CondensedOptions,
+        foundation: Foundation | None = None,
     ) -> None:
         super().__init__(continuum, pairs, supports, loads, monitors, options)
+        self.foundation = foundation
         self.stiffness: PETSc.Mat | None = None
         self.borders: list[PETSc.Vec] = []
         self.condensation: DirectCondensation | IterativeCondensation | None = None
@@ -107,6 +111,8 @@ class LinearSolver(InterfaceSolver):
             self.timings.add("compile", start)
             start = time.perf_counter()
             self.stiffness = self.continuum.stiffness()
+            if self.foundation is not None:
+                self.foundation.add_to(self.stiffness)
             self.borders = load_and_monitor_vectors(
                 self.continuum, self.loads, self.monitors, self._followed
             )
@@ -256,7 +262,13 @@ class LinearSolver(InterfaceSolver):
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies, by name; collective."""
-        return {"strain_energy": self.system.strain_energy(state) + self._thermal_part(state)}
+        whole = self.system.strain_energy(state) + self._thermal_part(state)
+        if self.foundation is None:
+            return {"strain_energy": whole}
+        u = self.displacement(state)
+        held = self.foundation.stored_in(u)
+        u.destroy()
+        return {"strain_energy": whole - held, ENERGY: held}
 
     def spent(self) -> dict[str, float]:
         """Energies the bodies have turned into something else, by name; linear ones none."""

@@ -24,8 +24,8 @@ from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
 from fxcrack.interface.pairing import Pair
 from fxcrack.interface.supports import Supports
-from fxcrack.solvers.can_fly import can_fly
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
+from fxcrack.solvers.free_motion import moves_freely
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
 from fxcrack.solvers.increment_work import (
     IncrementWork,
@@ -195,7 +195,9 @@ class NewtonSolver(InterfaceSolver):
             dt: Length of the first increment, time.
         """
         inertia = self.bodies.inertia
-        if inertia is not None and can_fly(self.continuum, self.supports, self.pairs, self.fronts):
+        if inertia is not None and moves_freely(
+            self.continuum, self.supports, self.pairs, self.fronts
+        ):
             self.free_start = True
             inertia.expect(dt)
 

@@ -21,7 +21,8 @@ class NewtonOptions:
             every iteration has its own (Newton's method to the letter, quadratic at the end).
         balance: Part of the stored energy by which work and energies may be off after one
             increment; where it is more the increment is divided, down to 1/512 of it. inf takes
-            every increment whole. Not for plasticity and inertia, which count otherwise.
+            every increment whole. Bodies that yield are held to it as well; those with inertia
+            are not, as their time integration accounts for the energies.
     """
 
     tolerance: float = 1e-10

@@ -20,6 +20,7 @@ from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
+from fxcrack.continuum.foundation import Stabilise
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.loads import AmplitudeLike, Ramp
 from fxcrack.criteria.evaluator import TipValues
@@ -107,6 +108,7 @@ class Analysis:
         ramps: Bonds whose force is released with time or over increments.
         fatigue: What cycles leave behind for later ones.
         started: Whether there is an equilibrium yet.
+        stabilise: The weak foundation of bodies, as the user gave it.
     """
 
     continuum: Continuum
@@ -122,6 +124,7 @@ class Analysis:
     ramps: list[ForceRamp] = field(default_factory=list)
     fatigue: FatigueState = field(default_factory=FatigueState)
     started: bool = False
+    stabilise: Stabilise | None = None
 
     # -- what it consists of -------------------------------------------------------------
 

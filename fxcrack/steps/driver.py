@@ -14,7 +14,13 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.errors import ComesApart, ConvergenceError, EnergyImbalance, InputError
+from fxcrack.base.errors import (
+    ComesApart,
+    ConvergenceError,
+    EnergyImbalance,
+    InputError,
+    SolverError,
+)
 from fxcrack.base.timings import Timings
 from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -37,6 +43,9 @@ BEYOND = 1e30
 
 LARGE = 1e60
 """A time that is never reached: the step has no end time."""
+
+_NOTHING = 1e-9
+"""Part of a step that is none."""
 
 
 class StepDriver:
@@ -97,6 +106,7 @@ class StepDriver:
             Why the step ended.
         """
         analysis, timings = self.analysis, self.analysis.solver.timings
+        begin = analysis.time
         start, factored = clock.perf_counter(), _seconds_of_factorisations(timings)
         analysis.update_tips()
         if self.resume is None:
@@ -105,7 +115,13 @@ class StepDriver:
         try:
             reason = stepping(self)
         except (NotPositiveDefinite, ComesApart) as error:
-            reason = _separated(error)
+            tips = any(len(v.tips) for v in analysis.tip_values)
+            done = (analysis.time - begin) / (self.end_time - begin)
+            at_once = self.end_time < LARGE and done <= _NOTHING
+            if isinstance(error, NotPositiveDefinite) and not tips and at_once:
+                # round-off alone decides whether faces part before or after the first load
+                raise SolverError(held_by_contact(error.why)) from error
+            reason = _separated(error, releasing=tips)
         except (TooManyCutbacks, ConvergenceError, EnergyImbalance) as error:
             reason = f"stopped: {error}"
             log.warn("%s", reason)
@@ -202,14 +218,32 @@ def _seconds_of_factorisations(timings: Timings) -> float:
     return sum(v for k, v in timings.seconds.items() if k.startswith("factor"))
 
 
-def _separated(error: NotPositiveDefinite | ComesApart) -> str:
+def held_by_contact(why: str) -> str:
+    """What to do about bodies that only contact could hold.
+
+    Args:
+        why: Which body can move, and how, as far as it is known.
+    """
+    return (
+        "there is no equilibrium: open faces would have to hold a body that nothing presses "
+        f"against them yet{f' ({why})' if why else ''}. Hold it by supports, prescribe its "
+        "displacement until it touches, or let a weak foundation hold it: Scene(..., "
+        "stabilise={'name of its cell group': 1e-6})"
+    )
+
+
+def _separated(error: NotPositiveDefinite | ComesApart, *, releasing: bool) -> str:
     what = (
         "the load exceeds what is left of the interface"
         if isinstance(error, ComesApart)
         else "releasing the next node would leave a body unsupported"
     )
+    if isinstance(error, NotPositiveDefinite) and not releasing:
+        what = "faces part whose contact alone held a body, which stabilise= of the scene may hold"
     if isinstance(error, NotPositiveDefinite) and error.why == HELD_BY_ROUND_OFF:
         what = f"releasing the next node, {error.why}"
+    elif isinstance(error, NotPositiveDefinite) and error.why:
+        what += f" ({error.why})"
     reason = f"total separation: {what}; the step ends in the last equilibrium before it"
     log.warn("%s", reason)
     return reason

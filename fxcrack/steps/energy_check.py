@@ -16,6 +16,7 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.errors import EnergyError
+from fxcrack.continuum.foundation import ENERGY
 from fxcrack.history import History, Row
 
 WARNED = 1e-3
@@ -29,6 +30,8 @@ _ROUND_OFF = 1e-6
 """Energies below this part of the products of loads and their conjugates are differences of large
 numbers (a body that expands freely stores nothing), and no measure for what is missing."""
 _STORED = ("strain_energy", "kinetic_energy")
+_STABILISED = 1e-2
+"""Part of the strain energy beyond which a foundation is more than a help."""
 _GIVEN = ("external_work", "initial_energy", "initial_kinetic_energy", "overlap_energy")
 _ADVICE = (
     "the increments are too long for the contact, friction or finite strain of the scene (give "
@@ -74,6 +77,14 @@ def check_energy(
         log.warn(
             "the energy balance of the step is off by %.2g of the largest energy at time %g: %s",
             part, time, _ADVICE,
+        )  # fmt: skip
+    held = max((float(r.get(ENERGY, 0.0)) for r in history.rows[first:]), default=0.0)
+    whole = max((float(r["strain_energy"]) for r in history.rows[first:]), default=0.0)
+    if held > _STABILISED * whole:
+        log.warn(
+            "the stabilising stiffness stores up to %.2g, and the bodies up to %.2g: it carries "
+            "part of the loads; lower stabilise, or hold the bodies by supports",
+            held, whole,
         )  # fmt: skip
     if made > REFUSED:
         log.warn(

@@ -147,5 +147,9 @@ def _changes_after(amplitude: AmplitudeLike, time: float = -np.inf) -> bool:
     """Whether an amplitude changes after a time, otherwise than in proportion to time."""
     if isinstance(amplitude, Ramp):
         return False
-    values = {amplitude(t) for t in amplitude.breaks() if t > time} | {amplitude(time)}
-    return len(values) > 1
+    breaks = amplitude.breaks() or (0.0,)
+    # beyond its breaks an amplitude goes on in a straight line
+    first, last = min(breaks), max(breaks)
+    begin = max(time, first - 1.0)
+    places = [begin, *(t for t in breaks if t > begin), max(begin, last) + 1.0]
+    return len({amplitude(t) for t in places}) > 1

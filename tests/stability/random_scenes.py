@@ -87,16 +87,18 @@ def main() -> int:
             rows[c.kind].append((result.worst["balance"], bool(bad)))
     print(f"{count} scenes, {refused} refused, {failed} failed, {time.monotonic() - begun:.0f} s")
     if given.table:
-        given.table.write_text(table(rows, given.seeds.start, given.seeds.start + count))
+        given.table.write_text(
+            table(rows, f"{given.seeds.start} to {given.seeds.start + count - 1}")
+        )
     return min(failed, 1)
 
 
-def table(rows: dict[str, list[tuple[float, bool]]], first: int, last: int) -> str:
+def table(rows: dict[str, list[tuple[float, bool]]], seeds: str) -> str:
     """The table of the documentation."""
     lines = [
         "# Which combination holds to what",
         "",
-        f"Random scenes {first} to {last - 1} of `tests/stability/combinations.py`: per",
+        f"Random scenes of seeds {seeds} (`tests/stability/combinations.py`): per",
         "combination the number of scenes, the largest error of the energy balance over the",
         "largest energy, and in how many scenes an invariant or a relation did not hold.",
         "",

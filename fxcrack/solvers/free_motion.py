@@ -16,13 +16,13 @@ _APART = 1e-9
 """Part of the length of a facet by which faces that do not touch are apart at least."""
 
 
-def can_fly(
+def moves_freely(
     continuum: Continuum, supports: Supports, pairs: Sequence[Pair], fronts: Sequence[Front]
 ) -> bool:
     """Whether a body can move freely; collective.
 
     Faces that may touch hold a body where they do: it rests on them under its loads. Where some are
-    apart, it flies.
+    apart, nothing holds it.
 
     Args:
         continuum: The bodies.
@@ -37,7 +37,7 @@ def can_fly(
         fixed[front.bonded & pair.paired, : 1 if pair.interface.normal_only else gdim] = True
         held = fixed.copy()
         if pair.interface.contact:
-            faces = ~front.bonded & pair.paired
+            faces = ~front.bonded & pair.can_touch
             held[faces, : gdim if pair.friction is not None else 1] = True
             apart |= bool(np.any(pair.gap[faces] > _APART * pair.surface.facet_size))
         bonded.append(fixed)
@@ -51,4 +51,4 @@ def can_fly(
     return False
 
 
-__all__ = ["can_fly"]
+__all__ = ["moves_freely"]
