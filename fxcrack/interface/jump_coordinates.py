@@ -70,6 +70,7 @@ from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.constrained_slaves import drop_constrained
 from fxcrack.interface.following import Following
+from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
@@ -344,7 +345,8 @@ def _interface_rows(
             "surfaces that continue each other, mesh.joined('whole', ['first', 'second'])"
         )
     composed = base
-    for _ in range(len(links) if not len(joined[0]) else 2 * len(links) + 1):
+    longest = links_in_chain(link.pair.hierarchy for link in links)
+    for _ in range(longest if not len(joined[0]) else 2 * longest + 1):
         composed = base + chain @ composed
     return sp.csr_matrix(composed)
 
