@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import Monitor
 from fxcrack.continuum.materials import Plastic
 from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
 from fxcrack.deck.constraints import read_constraints
 from fxcrack.deck.contact import Contacts
+from fxcrack.deck.explicit import bulk_viscosity
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
@@ -27,6 +29,7 @@ from fxcrack.deck.rules import (
     check_explicit,
     check_shells,
     density_of,
+    no_bulk_viscosity,
 )
 from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
@@ -133,7 +136,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     if moving:
         check_density(moving[0], sections, model)
     if explicit:
-        check_explicit(moving[0], flat, sections, loads, temperatures, boundary)
+        check_explicit(moving[0], flat, sections, boundary)
     if not explicit:
         contacts.share_supports(boundary)
     constrained = constraints.supports(boundary, groups)
@@ -148,11 +151,16 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     debonds, bonds = contacts.build(model.interactions, held)
     if explicit:
         titles = [d.interface.title for d in debonds]
-        steps = [
-            DeckStep(s.name, s.step, tuple(titles), dict.fromkeys(titles, s.step.rows))
-            for s in steps
-            if isinstance(s.step, Explicit)
-        ]
+        without = no_bulk_viscosity(flat, sections, finite=finite)
+        quadratic = not isinstance(sections.model, PlaneStress)
+        for place, (family, procedure) in enumerate(zip(model.steps, procedures, strict=True)):
+            assert isinstance(procedure.step, Explicit)
+            bulk = bulk_viscosity(
+                procedure.card, family, report, quadratic=quadratic, without=without
+            )
+            step = replace(procedure.step, bulk=bulk)
+            frequency = dict.fromkeys(titles, step.rows)
+            steps[place] = DeckStep(family.name, step, tuple(titles), frequency)
     densities = {n: density_of(m) for n, m in sections.materials.items()}
     arguments: dict[str, Any] = {
         "materials": sections.materials,
