@@ -172,6 +172,49 @@ def test_contact_of_pressed_faces_beside_hexahedra():
     np.testing.assert_allclose(found[0], found[1], rtol=2e-2)
 
 
+@pytest.mark.mpi
+@pytest.mark.three
+def test_pressure_on_both_faces_is_remote_tension():
+    """They differ by a uniform stress, which has no opening: G is the same to round-off.
+
+    1e-6: the solutions differ in how far round-off is magnified.
+    """
+    remote = [fx.Traction("top", (0.0, 1.0, 0.0)), fx.Traction("bottom", (0.0, -1.0, 0.0))]
+    faces = [fx.Pressure("upper_face", 1.0), fx.Pressure("lower_face", 1.0)]
+    bond = fx.Interface(
+        slave="upper_face", master="lower_face", bonded=lambda x: x[0] >= 2.0 - 1e-6, name="bond"
+    )
+    mesh = dcb_3d(
+        length=6.0, height=2.0, width=2.0, dx=1.0, dy=1.0, ny=2, cell="tetrahedron", order=2
+    )
+    found = []
+    for loads in (remote, faces):
+        scene = fx.Scene(
+            mesh,
+            materials=SOFT,
+            model=fx.Solid(),
+            supports=[
+                fx.Displacement("far_upper", x=0.0),
+                fx.Displacement("far_lower", x=0.0),
+                fx.Displacement("side_0", z=0.0),
+                fx.Displacement("pin_bottom", y=0.0),
+            ],
+            loads=loads,
+            debonds=[fx.Debond(bond, fx.VCCT(GIc=0.01))],
+        )
+        _, values, row = onset(scene)
+        found.append(values.report["GI"] / row["time"] ** 2)
+        scene.close()
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-6)
+
+
+def test_pressure_that_follows_the_crack_is_refused():
+    held = [fx.Displacement("centre_bottom", z=0.0)]
+    loads = [fx.Pressure("crack", 1.0, follows_crack=True)]
+    with pytest.raises(fx.InputError, match="second-order tetrahedra"):
+        tet_penny.make_scene(loads, held, size=0.4, radius=3.0, half_height=3.0)
+
+
 def test_first_order_tetrahedra_in_bending_are_warned_of(caplog):
     caplog.set_level(logging.WARNING)
     beam("tetrahedron", 1)

@@ -74,6 +74,10 @@ class Hierarchy:
         """Midside nodes of all edges at some corners, shape (k,)."""
         return np.asarray(self.midsides[np.isin(self.ends, nodes).any(axis=1)])
 
+    def link(self, has_jump: Bools) -> None:
+        """Mark midside nodes beside a marked corner, shape (n_nodes,), in place."""
+        has_jump[self.midsides] |= has_jump[self.ends].any(axis=1)
+
     def most_beside(self) -> int:
         """Largest number of midside nodes at one corner."""
         return int(np.bincount(self.ends.ravel(), minlength=1).max())

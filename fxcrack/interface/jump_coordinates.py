@@ -156,6 +156,10 @@ def build_coordinates(
     gdim, comm = layout.gdim, layout.comm
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
+    for pair, has_jump in zip(pairs, jumped, strict=True):
+        if pair.hierarchy is not None:
+            # loads on open faces belong to the corners as well, so that theirs are those of hats
+            pair.hierarchy.link(has_jump)
     nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped, further=layout.joints.nodes)
     which, value = supports.at_nodes(nodes)
     check_slaves(pairs, jumped, nodes, which, value, supports)

@@ -508,7 +508,7 @@ def make_pair(
             interface.title,
             pairing,
             stiffness_ratio(continuum, interface.slave, interface.master),
-            fineness_ratio(slave, master, paired),
+            fineness_ratio(slave, master, foot, paired),
             may_exchange=(interface.bonded is None or callable(interface.bonded))
             and covered_whole(master, under)
             and alike
