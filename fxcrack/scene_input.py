@@ -48,6 +48,7 @@ from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
 from fxcrack.history import History
+from fxcrack.interface.locking import warn_of_locking
 from fxcrack.interface.pairing import Interface, make_pair
 from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
@@ -186,9 +187,11 @@ def compose(given: SceneInput) -> Analysis:
             others=[i for i in given.interfaces if i is not one],
             supported=supports.which,
             by_nodes=inertia or (one.contact and slides),
+            cracks=any(d.interface is one for d in given.debonds),
         )
         for one in given.interfaces
     ]
+    warn_of_locking(continuum, pairs[: len(given.debonds)])
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)

@@ -74,7 +74,7 @@ def test_a_deck_and_the_scene_in_python_give_the_same_history(tmp_path):
     assert not deck.scene.debonds[0].release_chosen  # progressive, as is the default there
     by_hand = same_in_python(deck.scene)
     found = deck.run()
-    wanted = by_hand.run(fx.Explicit(until=fx.Time(2.0), rows=20))
+    wanted = by_hand.run(fx.Explicit(until=fx.Time(2.0), rows=20, bulk=(0.06, 1.2)))
     assert found.rows[-1]["released[TOP]"] == wanted.rows[-1]["released[TOP]"] > 0
     assert len(found) == len(wanted)
     for column in ("R[11.y]", "R[21.y]", "u[11.y]", "a[TOP]", "strain_energy", "kinetic_energy"):
@@ -162,9 +162,7 @@ def test_a_surface_that_ends_with_the_bonded_set_is_warned_of(tmp_path, caplog):
         ("11, 2, 2, 0.1", "11, 2, 2, 0.1\n*DEBOND, SLAVE=TOP, MASTER=BOTTOM", "quasi-static steps"),
         ("*DENSITY\n1.\n", "", "has no \\*DENSITY"),
         ("*DENSITY", "*DAMPING, BETA=1E-3\n*DENSITY", "BETA shortens the increments"),
-        ("*DENSITY", "*PLASTIC\n1.\n*DENSITY", "plasticity is not available in explicit"),
         ("*BOUNDARY, AMPLITUDE=A", "*BOUNDARY", "jumps at the beginning of an explicit step"),
-        ("*BOUND", "*TEMPERATURE\n1, 5.\n*BOUND", "temperatures are not available in explicit"),
         ("*STEP, NLGEOM=NO\n*DYN", "*STEP\n*DYNAMIC\n0.1, 1.\n*END STEP\n*STEP\n*DYN", "as two"),
     ],
 )
@@ -175,17 +173,144 @@ def test_decks_that_are_refused(tmp_path, old, new, words):
     assert "model.inp, line" in str(caught.value)
 
 
-def test_bulk_viscosity_is_left_out_and_said_so(tmp_path):
-    said = "the bulk viscosity of 0.06 and 1.2"
-    assert any(said in line for line in read(tmp_path, DECK).report.replaced)
+def bulk_of(folder, text, numbers=None):
+    """Bulk viscosity of a deck, and what is said of it."""
+    if numbers is not None:
+        text = text.replace(", 2.\n*B", f", 2.\n*BULK VISCOSITY\n{numbers}\n*B")
+    found = read(folder, text)
+    return found.steps[0].step.bulk, [x for x in found.report.replaced if "bulk" in x]
 
-    def given(numbers):
-        return read(tmp_path, DECK.replace(", 2.\n*B", f", 2.\n*BULK VISCOSITY\n{numbers}\n*B"))
 
-    assert not any("bulk" in line for line in given("0., 0.").report.replaced)
-    assert any("viscosity of 0.03 and 1.2" in line for line in given("0.03").report.replaced)
-    with pytest.raises(DeckError, match="bulk viscosity above the default"):
-        given("0.5, 1.2")
+def test_bulk_viscosity_of_the_card_or_by_default(tmp_path):
+    assert bulk_of(tmp_path, DECK) == ((0.06, 1.2), [])
+    assert bulk_of(tmp_path, DECK, "0., 0.") == ((0.0, 0.0), [])
+    assert bulk_of(tmp_path, DECK, "0.5") == ((0.5, 1.2), [])
+    # elements of plane stress have the linear part alone
+    assert bulk_of(tmp_path, DECK.replace("CPE4", "CPS4"))[0] == (0.06, 0.0)
+    with pytest.raises(DeckError, match="must not be negative"):
+        bulk_of(tmp_path, DECK, "-0.1, 1.2")
+
+
+def test_bulk_viscosity_that_bodies_do_not_have(tmp_path):
+    turning = DECK.replace(", NLGEOM=NO", "")
+    rubber = DECK.replace("*ELASTIC\n1000., 0.3", "*HYPERELASTIC, NEO HOOKE\n200., 2e-3")
+    for text, why in ((turning, "steps with NLGEOM"), (rubber, "hyperelastic bodies")):
+        bulk, (said,) = bulk_of(tmp_path, text)
+        assert bulk == (0.0, 0.0)
+        assert "the bulk viscosity of 0.06 and 1.2" in said and why in said
+        assert bulk_of(tmp_path, text, "0., 0.") == ((0.0, 0.0), [])
+        assert "viscosity of 0.03 and 1.2" in bulk_of(tmp_path, text, "0.03")[1][0]
+        with pytest.raises(DeckError, match=f"above the default .* not available for {why}"):
+            bulk_of(tmp_path, text, "0.5, 1.2")
+
+
+LOADED = """*AMPLITUDE, NAME=A
+0., 0., 0.5, 1., 9., 1.
+*STEP, NLGEOM={finite}
+*DYNAMIC, EXPLICIT
+, 1.
+*BOUNDARY
+LEFT, 1, 2
+*DSLOAD, AMPLITUDE=A
+END, P, {pressure}
+{cards}*OUTPUT, HISTORY, NUMBER INTERVAL=10
+*END STEP
+"""
+
+
+def same_rows(deck, by_hand, bulk):
+    """The last row of a deck whose history is that of the scene by hand; both are closed."""
+    found = deck.run()
+    wanted = by_hand.run(fx.Explicit(until=fx.Time(1.0), rows=10, bulk=bulk))
+    assert len(found) == len(wanted)
+    columns = ("strain_energy", "kinetic_energy", "external_work", "plastic_energy")
+    for column in (c for c in columns if c in wanted.columns):
+        size = np.abs(wanted[column]).max()
+        assert found[column] == pytest.approx(wanted[column], rel=1e-10, abs=1e-10 * size)
+    for one in (deck.scene, by_hand):
+        one.close()
+    return found.rows[-1]
+
+
+def test_bodies_that_yield_and_are_heated(tmp_path):
+    material = "*DENSITY\n2.\n*EXPANSION\n1e-5\n*PLASTIC\n0.1, 0.\n10.1, 0.2\n"
+    text = PLATE + material + LOADED.format(
+        finite="NO", pressure=0.3, cards="*TEMPERATURE, AMPLITUDE=A\nALL, 100.\n"
+    )  # fmt: skip
+    deck = fx.read_deck(write(tmp_path, text))
+    by_hand = fx.Scene(
+        deck.scene.mesh,
+        materials=fx.Plastic(
+            200.0, 0.25, yield_stress=0.1, hardening=50.0, density=2.0, expansion=1e-5
+        ),
+        model=fx.PlaneStrain(2.0),
+        supports=[fx.Displacement("LEFT", x=0.0, y=0.0)],
+        loads=[fx.Pressure("END", 0.3, amplitude=fx.Amplitude((0.0, 0.5, 9.0), (0.0, 1.0, 1.0)))],
+        effects=[
+            fx.Temperature(100.0, amplitude=fx.Amplitude((0.0, 0.5, 9.0), (0.0, 1.0, 1.0))),
+            fx.Inertia(),
+        ],
+    )
+    assert same_rows(deck, by_hand, (0.06, 1.2))["plastic_energy"] > 0.0
+
+
+def test_a_pressure_follows_the_bodies_with_nlgeom(tmp_path):
+    step = LOADED.format(finite="YES", pressure=1.0, cards="*DLOAD\nLAST, P3, 0.5\n")
+    text = PLATE + "*DENSITY\n2.\n" + step
+    deck = fx.read_deck(write(tmp_path, text))
+    assert all(load.follows for load in deck.scene.loads)
+    assert any("the bulk viscosity of 0.06 and 1.2" in line for line in deck.report.replaced)
+
+    def by_hand(*, follows):
+        rise = fx.Amplitude((0.0, 0.5, 9.0), (0.0, 1.0, 1.0))
+        at_once = fx.Amplitude((0.0, 1e-6), (0.0, 1.0))
+        return fx.Scene(
+            deck.scene.mesh,
+            materials=fx.Isotropic(200.0, 0.25, density=2.0),
+            model=fx.PlaneStrain(2.0),
+            supports=[fx.Displacement("LEFT", x=0.0, y=0.0)],
+            loads=[
+                fx.Pressure("END", 1.0, amplitude=rise, follows=follows),
+                fx.Pressure("LAST.P3", 0.5, amplitude=at_once, follows=follows),
+            ],
+            effects=[fx.FiniteStrain(), fx.Inertia()],
+        )
+
+    kept = by_hand(follows=False)
+    others = kept.run(fx.Explicit(until=fx.Time(1.0), rows=10)).rows[-1]
+    kept.close()
+    last = same_rows(deck, by_hand(follows=True), (0.0, 0.0))
+    assert abs(last["external_work"] / others["external_work"] - 1.0) > 1e-3
+
+
+def test_an_unstable_increment_is_said_in_words_of_the_deck(tmp_path, caplog):
+    """Heat of 1 % strain at once compresses elements so fast that their viscosity asks for more."""
+    step = LOADED.format(finite="NO", pressure=0, cards="*TEMPERATURE\nALL, 10.\n")
+    text = PLATE + "*DENSITY\n2.\n*EXPANSION\n1e-3\n" + step
+    deck = fx.read_deck(write(tmp_path, text))
+    assert deck.run().reason.startswith("stopped")
+    assert "SCALE FACTOR=0.8 " in caplog.text and "*BULK VISCOSITY with 0., 0." in caplog.text
+    assert "UNSTABLE GROWTH" not in caplog.text
+    deck.scene.close()
+    slower = text.replace("EXPLICIT\n", "EXPLICIT, SCALE FACTOR=0.8\n")
+    deck = fx.read_deck(write(tmp_path, slower))
+    assert not deck.run().reason.startswith("stopped")
+    deck.scene.close()
+
+
+def test_sudden_heat_lets_a_plate_swing_about_its_new_length(tmp_path):
+    """A free plate of the same expansion everywhere: waves of 2 alpha T L at most, mean alpha T."""
+    cards = "*TEMPERATURE\nALL, 1.\n*NODE PRINT, NSET=RIGHT\nU1\n"
+    material = "*DENSITY\n2.\n*EXPANSION\n1e-3\n"
+    step = LOADED.format(finite="NO", pressure=0, cards=cards)
+    step = step.replace(", 1.\n*BOUND", ", 20.\n*BOUND").replace("LEFT, 1, 2", "LEFT, 1\n1, 2")
+    step = step.replace("INTERVAL=10", "INTERVAL=400")
+    deck = fx.read_deck(write(tmp_path, PLATE.replace("0.25", "0.") + material + step))
+    assert deck.steps[0].step.bulk == (0.06, 1.2)
+    moved = deck.run()["m[U1 RIGHT]"].astype(float)
+    deck.scene.close()
+    assert 0.003 < moved.max() <= 0.0045
+    assert moved[len(moved) // 2 :].mean() == pytest.approx(0.002, rel=0.02)
 
 
 @pytest.mark.parametrize(
@@ -247,13 +372,14 @@ def test_what_is_written_gives_the_same_history(tmp_path):
         fx.Displacement("far_upper", x=0.0, y=0.0), fx.Displacement("far_lower", x=0.0, y=0.0)],
         "loads": [fx.PointForce("pin_top", (0.0, 60.0)), fx.PointForce("pin_bottom", (0.0, -60.0))],
     }  # fmt: skip
-    step = fx.Explicit(until=fx.Time(1e-4), rows=5, safety=0.9, mass_scale=3.0)
+    step = fx.Explicit(until=fx.Time(1e-4), rows=5, safety=0.9, mass_scale=3.0, bulk=(0.1, 0.5))
     effects = [
         fx.Inertia(density=2.7e-9, rayleigh=(5.0, 0.0), velocity=(0.5, lambda x: 0.1 * x[0]))
     ]
     one = scene(dcb_2d(dx=10.0, ny=1), interface={"friction": 0.2}, effects=effects, **moving)
     deck = round_trip(tmp_path / "a.inp", one, [step], rel=1e-9)
     assert deck.steps[0].step.safety == pytest.approx(0.9)
+    assert deck.steps[0].step.bulk == (0.1, 0.5)
     effects = [fx.Inertia.hht(-0.1, density=2.7e-9)]
     one = scene(dcb_2d(dx=10.0, ny=1), effects=effects, **moving)
     # Newton's method ends at another residual after another numbering of the unknowns
@@ -265,6 +391,7 @@ def test_what_is_written_gives_the_same_history(tmp_path):
     [
         ({"step": {"start": "equilibrium"}}, "start='equilibrium'"),
         ({"step": {"contact": "penalty"}}, "contact='penalty'"),
+        ({"step": {"bulk": (0.0, 1.0)}, "model": fx.PlaneStress()}, "viscosity in plane stress"),
         ({"release": fx.StepRelease()}, "the release law StepRelease"),
         ({"interface": {"gap": "keep"}}, "gap='keep'"),
         ({"criterion": fx.VCCT(0.2, viscosity=0.1)}, "viscosity and unstable_tolerance"),

@@ -22,9 +22,9 @@ from specimens import (
 import fxcrack as fx
 from fxcrack.demos.mmb import ARMS, HALF_SPAN
 from fxcrack.interface.front import Front
+from fxcrack.interface.front_order import ordered_fronts
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.meshes.mmb import mmb_2d
-from fxcrack.output.front_line import ordered_fronts
 
 
 def wide(comm: Any = MPI.COMM_WORLD, criterion: Any = None, **options: Any) -> fx.Scene:

@@ -14,7 +14,7 @@ from test_finite_strain import slider
 import fxcrack as fx
 from fxcrack.interface.mortar import SurfaceWeights, surface_weights
 from fxcrack.interface.projection import project
-from fxcrack.interface.roles import matching
+from fxcrack.interface.roles import fineness_ratio, matching
 from fxcrack.interface.segments import clip, find_segments
 from fxcrack.interface.surface import FacetSurface
 from fxcrack.meshes.blocks import Blocks, build
@@ -99,6 +99,15 @@ def test_cut_polygons() -> None:
 def test_segments_of_facets_that_turn_their_backs() -> None:
     same = tensor_surface("interval", 1, np.linspace(0.0, 1.0, 3))
     assert len(find_segments(same, same, 0.1).weight) == 0
+
+
+def test_fineness_is_that_of_facets_under_the_slave() -> None:
+    """Coarse facets of the master beside the slave do not count."""
+    slave = facing("interval", 1, np.linspace(0.1, 1.9, 5))
+    master = tensor_surface("interval", 1, [*np.linspace(0.0, 2.0, 9), 8.0, 20.0])
+    foot = project(slave.x, master)
+    paired = np.ones(slave.n_nodes, dtype=bool)
+    assert fineness_ratio(slave, master, foot, paired) == pytest.approx(0.25 / 0.45)
 
 
 def test_what_counts_as_matching() -> None:

@@ -167,9 +167,10 @@ def choose_roles(
             role[bonded] = FIXED
         is_open = ~front.bonded & pair.paired
         if pair.interface.contact:
-            role[is_open, 0] = RETAINED
+            may_touch = is_open & pair.can_touch
+            role[may_touch, 0] = RETAINED
             if friction:
-                role[is_open] = RETAINED
+                role[may_touch] = RETAINED
         if on and is_open.any() and bonded.any():
             x = pair.surface.x
             tips = front.candidates()
@@ -183,6 +184,11 @@ def choose_roles(
             if ahead > 0.0:
                 near |= bonded & (distance <= ahead + margin)
                 far = far + ahead + margin
+            if pair.hierarchy is not None:
+                # what comes free with a corner is retained with it
+                near[pair.hierarchy.beside(np.flatnonzero(near))] = True
+                near &= bonded
+                distance = pair.hierarchy.nearest(distance)
             role[near] = _retained_of(pair, role[near])
             rest = np.flatnonzero(bonded & ~near & (distance <= far))
             rest = rest[np.lexsort((rest, distance[rest]))]

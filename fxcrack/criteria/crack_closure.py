@@ -41,7 +41,9 @@ def opens(force: npt.ArrayLike, jump: npt.ArrayLike) -> npt.NDArray[np.bool_]:
     return np.asarray(pulled | ((delta.sum(axis=1) > 0.0) & ((p * delta).sum(axis=1) > 0.0)))
 
 
-def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike) -> Array:
+def closure_rates(
+    force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike, *, signed: int | None = None
+) -> Array:
     """Split the closure energy of units by mode.
 
     A unit pressed together (:func:`opens` is False) stays closed when released: its G_I is zero.
@@ -54,6 +56,9 @@ def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike
             positive, shape (n, k, 3) [force]; k nodes per unit.
         jump: Jumps of displacement after release, same frame, shape (n, k, 3) [length].
         area: Area that releasing the unit sets free, shape (n,) or one number [length^2].
+        signed: How many nodes of a unit, the first ones, have forces with the sign of the
+            traction; all of them by default, and the corner alone where jumps are hierarchical
+            (:mod:`fxcrack.interface.hierarchy`).
 
     Returns:
         G_I, G_II, G_III, shape (n, 3) [force/length]. They add up to the energy freed per area,
@@ -78,7 +83,7 @@ def closure_rates(force: npt.ArrayLike, jump: npt.ArrayLike, area: npt.ArrayLike
             "finite: look at the mesh near this front node"
         )
     rates = 0.5 * (p * delta).sum(axis=1) / a[:, None]
-    rates[~opens(p[..., 0], delta[..., 0]), 0] = 0.0
+    rates[~opens(p[:, :signed, 0], delta[:, :signed, 0]), 0] = 0.0
     return np.asarray(rates)
 
 

@@ -39,6 +39,7 @@ from fxcrack.criteria.probe import (
     State,
     bond_forces,
     closure_jumps,
+    closure_units,
     further_openings,
     openings,
 )
@@ -46,6 +47,7 @@ from fxcrack.criteria.release_laws import Driver, ReleaseLaw
 from fxcrack.criteria.toughness import Property, check_property, resolve
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.hierarchy import CLOSURE_BY_CORNERS
 from fxcrack.interface.tips import FrontUnits, Tips, edge_midsides, units_of
 
 Method = Literal["vcct", "closure", "domain"]
@@ -295,6 +297,8 @@ class RateEvaluator(SofteningEvaluator):
         self._domain: DomainIntegral | None = None
         if criterion.method == "domain":
             self._domain = DomainIntegral(probe, criterion.rings, criterion.reference_length)
+        hierarchy = probe.pair.hierarchy
+        self._largest_unit = 0 if hierarchy is None else 1 + hierarchy.most_beside()
         surface = probe.pair.surface
         criterion.check_slaves(surface.n_nodes)
         if softens and criterion.needs_exact_S and not criterion.softens:
@@ -328,7 +332,9 @@ class RateEvaluator(SofteningEvaluator):
         # what nothing pulls apart would otherwise grow under loads of 1e10 and more
         noise = self.probe.round_off(tips.force_nodes, state).max(axis=1)
         force = np.where(np.abs(force) < noise[:, None, None], 0.0, force)
-        if self.criterion.method == "closure":
+        if self._closes_units:
+            force, opening = closure_units(self.probe, tips, force, state, self._rows(tips))
+        elif self.criterion.method == "closure":
             opening = closure_jumps(self.probe, tips, force)
         else:
             opening = self._openings(tips, state)
@@ -345,6 +351,15 @@ class RateEvaluator(SofteningEvaluator):
         if self._domain is not None:
             columns.append(self._domain.measure(tips, state, force))
         return np.concatenate(columns, 1)
+
+    @property
+    def _closes_units(self) -> bool:
+        """Whether a corner is closed together with the midside nodes that open with it."""
+        return self._largest_unit > 0 and self.criterion.method == "closure"
+
+    def _rows(self, tips: Tips) -> int:
+        """Nodes per tip whose forces and openings are measured."""
+        return self._largest_unit if self._closes_units else int(tips.force_nodes.shape[1])
 
     def _openings(self, tips: Tips, state: State) -> Array:
         """Openings that the forces at tips are multiplied with, shape (n, k, 3), length."""
@@ -417,7 +432,7 @@ class RateEvaluator(SofteningEvaluator):
 
     def _rates(self, tips: Tips, measured: Array, found: DomainValues | None) -> Array:
         """The same, with what method="domain" has found."""
-        half = 3 * tips.force_nodes.shape[1]
+        half = 3 * self._rows(tips)
         force, opening = (
             m.reshape(len(tips), -1, 3) for m in (measured[:, :half], measured[:, half : 2 * half])
         )
@@ -435,12 +450,15 @@ class RateEvaluator(SofteningEvaluator):
     def _closed(self, tips: Tips, force: Array, opening: Array) -> Array:
         """Rates by crack closure, shape (n, 3), force/length."""
         if self.criterion.method == "closure":
-            return closure_rates(force, opening, tips.area)
+            signed = 1 if self._closes_units else None
+            return closure_rates(force, opening, tips.area, signed=signed)
         if tips is not self._weighed:
             lengths = (tips.d_ahead, tips.d_behind, tips.width)
             self._weights = closure_weights(
                 *lengths, force.shape[1], self.criterion.normalisation, tips.straight
             )
+            if self._largest_unit:
+                self._weights = self._weights / CLOSURE_BY_CORNERS
             self._weighed = tips
         return weighted_rates(force, opening, self._weights)
 
@@ -478,10 +496,10 @@ class RateEvaluator(SofteningEvaluator):
 
     def _columns_before(self, tips: Tips) -> int:
         """Columns of what is measured before those of method="domain"."""
-        return 6 * int(tips.force_nodes.shape[1]) + int(self._moving)
+        return 6 * self._rows(tips) + int(self._moving)
 
     def _temperature_column(self, tips: Tips, measured: Array) -> Array:
-        return np.asarray(measured[:, 6 * tips.force_nodes.shape[1]])
+        return np.asarray(measured[:, 6 * self._rows(tips)])
 
     def units(self, tips: Tips) -> FrontUnits:
         """Tips that are released together; of tips that were repeated, those of the first time."""
@@ -541,6 +559,7 @@ class RateEvaluator(SofteningEvaluator):
             worst = units.leaders[np.argmax(critical)]
             raise NotPositiveDefinite(int(tips.node[worst]))
         out, left = [], np.unique(nodes)
+        bonded = front.bonded.copy()
         # a corner row that two edges share belongs to the one that is more critical; rows that are
         # released alone (fatigue) come last
         order = np.argsort(-values.f[units.leaders], kind="stable")
@@ -554,7 +573,9 @@ class RateEvaluator(SofteningEvaluator):
             left = np.setdiff1d(left, unit)
             area = front.swept(int(tips.node[first]), unit)
             energy = float(critical[k] * area)
-            out.append(CohesiveUnit(unit, energy, bool(rates[k, 0] <= 0.0), area))
+            every = self.probe.pair.opened_with(bonded, unit)
+            bonded[every] = False
+            out.append(CohesiveUnit(every, energy, bool(rates[k, 0] <= 0.0), area))
         return out
 
     def breaks(self) -> tuple[float, ...]:

@@ -308,6 +308,42 @@ def further_openings(probe: FrontProbe, tips: Tips, rows: Ints, state: State) ->
     return np.asarray(np.einsum("nci,nc->ni", tips.frame[rows], jump))
 
 
+def closure_units(
+    probe: FrontProbe, tips: Tips, force: Array, state: State, width: int
+) -> tuple[Array, Array]:
+    """Forces and jumps of the units of tips whose jumps are hierarchical, in the tip frames.
+
+    A unit is the corner and the midside nodes that come free with it alone
+    (:mod:`fxcrack.interface.hierarchy`).
+
+    Args:
+        probe: The interface.
+        tips: Front nodes.
+        force: Bond forces of the corners in the tip frames, shape (n, 1, 3) [force].
+        state: State of the solver.
+        width: Rows of the result, at least those of the largest unit.
+
+    Returns:
+        Bond forces and jumps after release of each unit alone, the corner first and zero rows last,
+        each of shape (n, width, 3) [force, length].
+    """
+    forces, jumps = np.zeros((len(tips), width, 3)), np.zeros((len(tips), width, 3))
+    pair, bonded = probe.pair, probe.front.bonded
+    assert pair.hierarchy is not None
+    for i, node in enumerate(tips.node):
+        frame = tips.frame[i]
+        midsides = pair.hierarchy.opened_by(bonded, np.array([node]))
+        nodes, k = np.append(node, midsides), 1 + len(midsides)
+        forces[i, 0] = force[i, 0]
+        forces[i, 1:k] = probe.bond_forces(midsides, state) @ frame
+        pulls = forces[i, :k] @ frame.T
+        jump = probe.released_jumps(nodes, pulls) @ frame
+        if not opens(forces[None, i, :1, 0], jump[None, :1, 0])[0]:
+            jump = probe.released_jumps(nodes, pulls, frame[:, 0]) @ frame
+        jumps[i, :k] = jump
+    return forces, jumps
+
+
 def closure_jumps(probe: FrontProbe, tips: Tips, force: Array) -> Array:
     """Jumps that releasing the force nodes of each tip alone would open, in the tip frames.
 

@@ -25,6 +25,10 @@ from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import gather_surface
 from fxcrack.interface.tips import Tips
 
+_STRAIGHT = 30.0
+"""Turn of the front from one element to the next above which single nodes are not reliable
+[degrees]; a circle has 15 with 24 elements around it."""
+
 
 class RingBuilder:
     """Makes rings; those of tips around which nothing has changed are kept.
@@ -67,6 +71,8 @@ class RingBuilder:
         gdim = self._probe.gdim
         line = FrontLine.of(front, tips)
         pair, surface = self._probe.pair, front.surface
+        if not len(opened):
+            self._look_at_turning(line)
         x = surface.x[tips.node]
         here = []
         for node in tips.node:
@@ -310,6 +316,21 @@ class RingBuilder:
         if what not in self._said:
             self._said.add(what)
             log.warn(words, *values)
+
+    def _look_at_turning(self, line: FrontLine) -> None:
+        """Warn once where the front is far from straight over the ring."""
+        angle, tip = line.turning()
+        if angle > _STRAIGHT:
+            self._say(
+                "turning",
+                "interface '%s': the front turns by %.0f degrees from one element to the next, at "
+                "%s among others; method='domain' is not reliable at single nodes of such a front: "
+                "compare with method='vcct', or take elements that are shorter in the direction of "
+                "growth than along the front",
+                self._title,
+                angle,
+                format_point(line.x[tip]),
+            )
 
     def _look_at_oscillation(self, oscillation: float, length: float) -> None:
         """Warn once where the modes depend on a length that nobody has stated."""

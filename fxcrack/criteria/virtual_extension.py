@@ -15,10 +15,9 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.interface.front import Front
 from fxcrack.interface.front_cells import FrontCells
+from fxcrack.interface.front_order import ordered_fronts
 from fxcrack.interface.tips import Tips
 
-_ALONG = 0.5
-"""Cosine between the front and an edge that is part of it, at least."""
 _ONE_FACE = 0.75
 """Cosine between the normals of two facets of one smooth face, at least; at edges it is less."""
 _NOTHING = 1e-6
@@ -31,8 +30,8 @@ class FrontLine:
 
     Attributes:
         x: Positions of the tips, shape (n_tips, 3) [length].
-        segments: Tips at both ends of each segment, twice the same for a point, shape
-            (n_segments, 2).
+        segments: Tips at both ends of each segment in their order along the front, twice the same
+            for a point, shape (n_segments, 2).
         members: Corner tips that stand for each tip: itself, or those beside a midside node.
         dim: Dimension of the interface, 1 or 2.
     """
@@ -56,9 +55,14 @@ class FrontLine:
         at = {int(node): i for i, node in enumerate(tips.node)}
         segments: list[tuple[int, int]] = []
         if surface.dim == 2:
-            for i in np.flatnonzero(corners).tolist():
-                segments += [(min(i, j), max(i, j)) for j in _neighbours(front, tips, at, i)]
-        found = np.array(sorted(set(segments)), dtype=np.int64).reshape(-1, 2)
+            for nodes, closed in ordered_fronts(front, surface.x):
+                following = nodes[1:] + nodes[:1] if closed else nodes[1:]
+                segments += [
+                    (at[a], at[b])
+                    for a, b in zip(nodes, following, strict=False)
+                    if a in at and b in at and a != b
+                ]
+        found = np.array(segments, dtype=np.int64).reshape(-1, 2)
         alone = np.setdiff1d(np.flatnonzero(corners), found.ravel())
         found = np.concatenate([found, np.stack([alone, alone], axis=1)])
         members = []
@@ -77,16 +81,30 @@ class FrontLine:
         In 2-D what is out of the plane is not counted: 1. A tip of a surface without others beside
         it opens the width that belongs to it.
         """
-        total = 0.0
+        total, swept = 0.0, 0.0
         normal, growth = tips.frame[i, :, 0], tips.frame[i, :, 1]
         for member in self.members[i]:
             for a, b in self.segments[(self.segments == member).any(axis=1)]:
                 if a == b:
                     total += 1.0 if self.dim == 1 else float(tips.width[i])
-                else:
+                else:  # segments run along the front: one that is swept backwards counts as such
                     chord = self.x[b] - self.x[a]
-                    total += 0.5 * abs(float(np.cross(normal, chord) @ growth))
-        return total
+                    swept += 0.5 * float(np.cross(normal, chord) @ growth)
+        return total + abs(swept)
+
+    def turning(self) -> tuple[float, int]:
+        """The largest angle between neighbouring segments [degrees], and the tip between them."""
+        largest, where = 0.0, 0
+        before = {int(b): int(a) for a, b in self.segments if a != b}
+        for a, b in self.segments.tolist():
+            if a == b or a not in before:
+                continue
+            one, two = self.x[a] - self.x[before[a]], self.x[b] - self.x[a]
+            cosine = float(one @ two) / float(np.linalg.norm(one) * np.linalg.norm(two))
+            angle = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+            if angle > largest:
+                largest, where = angle, a
+        return largest, where
 
     def nearest(self, x: Array) -> tuple[Array, Ints, Array]:
         """The nearest point of the front.
@@ -110,26 +128,6 @@ class FrontLine:
         row = np.arange(len(x))
         last = share[row, best]
         return distance[row, best], self.segments[best], np.stack([1.0 - last, last], axis=1)
-
-
-def _neighbours(front: Front, tips: Tips, at: dict[int, int], i: int) -> list[int]:
-    """Tips beside a corner tip along the front, at most one on each side."""
-    x = front.surface.x
-    node = int(tips.node[i])
-    best: dict[bool, tuple[float, int]] = {}
-    for end, middle in front.links[node]:
-        j = at.get(int(end))
-        if j is None or (middle >= 0 and not front.bonded[middle]):
-            continue
-        edge = x[end] - x[node]
-        cosine = float(edge @ tips.frame[i, :, 2]) / float(np.linalg.norm(edge))
-        other = float(edge @ tips.frame[j, :, 2]) / float(np.linalg.norm(edge))
-        if min(abs(cosine), abs(other)) < _ALONG:
-            continue
-        side = cosine > 0.0
-        if side not in best or abs(cosine) > best[side][0] * (1.0 + 1e-9):
-            best[side] = abs(cosine), j
-    return [j for _, j in best.values()]
 
 
 class Corners:

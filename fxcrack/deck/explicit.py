@@ -12,6 +12,8 @@ _SCALING = ("FIXEDMASSSCALING", "VARIABLEMASSSCALING")
 _WORDS = ("BULKVISCOSITY", *_SCALING)
 SAFETY = 0.97
 """Part of the stable increment that a scale factor of 1 stands for."""
+DEFAULT_BULK = (0.06, 1.2)
+"""Linear and quadratic bulk viscosity of a step without ``*BULK VISCOSITY``."""
 _MOST_ROWS = 20_000
 
 
@@ -21,7 +23,7 @@ def explicit_words(step: Family) -> list[Card]:
 
 
 def explicit_step(card: Card, step: Family, start: float, report: Report) -> tuple[float, Explicit]:
-    """Length and step of an explicit procedure.
+    """Length and step of an explicit procedure, without bulk viscosity: the bodies decide on it.
 
     Args:
         card: ``*DYNAMIC, EXPLICIT``.
@@ -51,7 +53,6 @@ def explicit_step(card: Card, step: Family, start: float, report: Report) -> tup
             "the largest increment is left out: increments are the stable one throughout", card
         )
     options |= _mass_scaling(step, report)
-    _bulk_viscosity(card, step, report)
     return length, Explicit(
         until=Time(start + length),
         rows=_rows(step, length),
@@ -59,26 +60,42 @@ def explicit_step(card: Card, step: Family, start: float, report: Report) -> tup
     )
 
 
-def _bulk_viscosity(procedure: Card, step: Family, report: Report) -> None:
-    """Say that it is left out; more than the default, which is there without the card, is refused.
+def bulk_viscosity(
+    procedure: Card, step: Family, report: Report, *, quadratic: bool, without: str | None
+) -> tuple[float, float]:
+    """Bulk viscosity of a step: that of its card, or what is there without one.
+
+    Args:
+        procedure: ``*DYNAMIC, EXPLICIT``.
+        step: The step it stands in.
+        report: Takes what is left out.
+        quadratic: Whether the elements have the quadratic part; those of plane stress do not.
+        without: Why the bodies have none, ``None`` where they have.
 
     Raises:
-        DeckError: It is larger than the default.
+        DeckError: A number is negative, or more than the default is given to bodies without.
     """
     card = step.first("BULKVISCOSITY")
     given = [] if card is None else card.rows()
-    linear = given[0].number(0, 0.06) if given else 0.06
-    quadratic = given[0].number(1, 1.2) if given else 1.2
-    if card is not None and (linear > 0.06 or quadratic > 1.2):
+    found = tuple(
+        given[0].number(i, default) if given else default for i, default in enumerate(DEFAULT_BULK)
+    )
+    if card is not None and min(found) < 0.0:
+        card.fail(f"the bulk viscosity of {found[0]:g} and {found[1]:g} must not be negative")
+    if without is None:
+        return found[0], found[1] if quadratic else 0.0
+    if card is not None and any(b > d for b, d in zip(found, DEFAULT_BULK, strict=True)):
         card.fail(
-            "bulk viscosity above the default of 0.06 and 1.2 is not available; leave the card out"
+            f"bulk viscosity above the default of 0.06 and 1.2 is not available for {without}; "
+            "leave the card out"
         )
-    if linear or quadratic:
+    if any(found):
         report.replace(
-            f"the bulk viscosity of {linear:g} and {quadratic:g}, which damps waves as short as "
-            "the elements, is left out",
+            f"the bulk viscosity of {found[0]:g} and {found[1]:g}, which damps waves as short as "
+            f"the elements, is left out: it is not available for {without}",
             card or procedure,
         )
+    return 0.0, 0.0
 
 
 def _mass_scaling(step: Family, report: Report) -> dict[str, object]:
@@ -138,4 +155,4 @@ def _rows(step: Family, length: float) -> int:
     return min(n, _MOST_ROWS) or 200
 
 
-__all__ = ["SAFETY", "explicit_step", "explicit_words"]
+__all__ = ["SAFETY", "bulk_viscosity", "explicit_step", "explicit_words"]

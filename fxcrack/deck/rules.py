@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fxcrack.continuum.couplings import Coupling, Equation
-from fxcrack.continuum.materials import Material, Plastic
+from fxcrack.continuum.materials import Material, NeoHookean
 from fxcrack.continuum.section import Section
 from fxcrack.deck.cards import Card
 from fxcrack.deck.flat import Flat
@@ -62,12 +62,7 @@ def check_density(procedure: Procedure, sections: Sections, model: Model) -> Non
 
 
 def check_explicit(
-    procedure: Procedure,
-    flat: Flat,
-    sections: Sections,
-    loads: Loads,
-    temperatures: Temperatures,
-    boundary: Boundary,
+    procedure: Procedure, flat: Flat, sections: Sections, boundary: Boundary
 ) -> None:
     """Refuse what explicit dynamics does not have.
 
@@ -75,8 +70,6 @@ def check_explicit(
         procedure: The first explicit step.
         flat: The model.
         sections: Its materials.
-        loads: Its loads.
-        temperatures: Its temperatures.
         boundary: Its prescribed displacements.
 
     Raises:
@@ -90,31 +83,35 @@ def check_explicit(
             "implicit *DYNAMIC"
         )
     for family in flat.model.materials.values():
-        plastic = family.first("PLASTIC")
-        if plastic is not None and any(isinstance(m, Plastic) for m in sections.materials.values()):
-            plastic.fail("plasticity is not available in explicit dynamics; take implicit *DYNAMIC")
         damping = family.first("DAMPING")
         if damping is not None and sections.rayleigh[1]:
             damping.fail(
                 "BETA shortens the increments of explicit dynamics far more than it damps; give "
                 "ALPHA alone"
             )
-    if temperatures.first is not None:
-        temperatures.first.fail(
-            "temperatures are not available in explicit dynamics; leave them out"
-        )
     for given in boundary.entries:
         if given.value and given.curve is None and not (given.rate or given.fixed):
             given.card.fail(
                 f"the displacement {given.value:g} of '{given.name}' jumps at the beginning of an "
                 "explicit step, with a velocity without bound; give it an AMPLITUDE"
             )
-    entry = loads.following
-    if entry is not None:
-        entry.row.fail(
-            "a pressure follows the bodies where NLGEOM is on, which explicit dynamics does not "
-            "have; write NLGEOM=NO, or take *DSLOAD with TRVEC and FOLLOWER=NO"
-        )
+
+
+def no_bulk_viscosity(flat: Flat, sections: Sections, *, finite: bool) -> str | None:
+    """Why the bodies of an explicit step have no bulk viscosity; ``None`` where they have it.
+
+    Args:
+        flat: The model.
+        sections: Its materials.
+        finite: Whether NLGEOM is on.
+    """
+    if finite:
+        return "steps with NLGEOM, which is on unless NLGEOM=NO is written"
+    if flat.kind.stacked:
+        return "continuum shells"
+    if any(isinstance(m, NeoHookean) for m in sections.materials.values()):
+        return "hyperelastic bodies"
+    return None
 
 
 def check_constraints(supports: Sequence[AnySupport], cards: Sequence[Card]) -> None:
@@ -137,4 +134,11 @@ def check_constraints(supports: Sequence[AnySupport], cards: Sequence[Card]) -> 
     )
 
 
-__all__ = ["check_constraints", "check_density", "check_explicit"]
+__all__ = [
+    "check_constraints",
+    "check_density",
+    "check_explicit",
+    "check_shells",
+    "density_of",
+    "no_bulk_viscosity",
+]

@@ -22,6 +22,7 @@ from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import (
     BodyForce,
     Displacement,
@@ -424,6 +425,9 @@ class _Writer:
     def _step(self, step: DeckStep, length: float, conditions: list[str]) -> list[str]:
         finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
         explicit = isinstance(step.step, Explicit)
+        plane_stress = isinstance(self.scene.input.model, PlaneStress)
+        if isinstance(step.step, Explicit) and step.step.bulk[1] and plane_stress:
+            refuse(f"step '{step.name}': quadratic bulk viscosity in plane stress")
         out = [*step_lines(step, length, self.inertia, finite=finite), *conditions]
         if conditions and explicit:
             out += self.contact

@@ -97,6 +97,8 @@ def _explicit(what: Explicit, length: float) -> list[str]:
         words,
         f"{first}, {number(length)}",
         *scaling,
+        "*BULK VISCOSITY",
+        ", ".join(number(b) for b in what.bulk),
         f"*OUTPUT, HISTORY, NUMBER INTERVAL={what.rows}",
     ]
 

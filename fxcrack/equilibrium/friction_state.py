@@ -81,7 +81,7 @@ def nodes_of(pair: Pair, front: Front, index: Ints) -> Ints:
     """
     if not pair.interface.contact:
         return np.zeros(0, dtype=np.int64)
-    return np.flatnonzero(~front.bonded & pair.paired & (index[:, 0] >= 0))
+    return np.flatnonzero(~front.bonded & pair.can_touch & (index[:, 0] >= 0))
 
 
 def make_friction(

@@ -155,7 +155,7 @@ class InterfaceState:
             free = free[free >= 0]
             free = free[~system.closed[free] & ~np.isin(free, soft)]
             if len(free):
-                _free_open(system, pair, numbers[is_open & pair.paired, 0], free)
+                _free_open(system, pair, numbers[is_open & pair.can_touch, 0], free)
             if pair.interface.contact:
                 allow_contact(system, pair, front, numbers)
         if friction:
@@ -252,7 +252,7 @@ def allow_contact(system: ContactSystem, pair: Pair, front: Front, index: Ints) 
         front: Its front.
         index: Numbers of its retained jumps, -1 elsewhere, shape (n_nodes, gdim).
     """
-    normals = index[~front.bonded & pair.paired, 0]
+    normals = index[~front.bonded & pair.can_touch, 0]
     normals = normals[normals >= 0]
     system.touches[normals] = True
     system.contact[normals[~np.isin(normals, system.soft.components)]] = True

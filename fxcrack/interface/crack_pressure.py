@@ -89,6 +89,11 @@ class CrackPressure:
                 f"give the name of one of them ({names})"
             )
         pair = pairs[found[0]]
+        if pair.hierarchy is not None:
+            raise InputError(
+                f"{owner}: follows_crack is not possible on faces of second-order tetrahedra; take "
+                "first-order cells or second-order hexahedra, or a pressure on fixed faces"
+            )
         takes = pair.paired & ~_held(pair, continuum, supports)
         parts = pair.title, found[0], [pair], [takes]
         return cls(load.title, load.amplitude, load.value, *parts)

@@ -47,6 +47,9 @@ def renewed(
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
     """
+    if pair.hierarchy is not None:
+        found = renewed(pair.by_nodes(), bonded, master, u_slave, u_master)
+        return None if found is None else found.by_corners()
     gdim = u_slave.shape[1]
     x, y = pair.surface.x.copy(), master.x.copy()
     x[:, :gdim] += u_slave
@@ -132,6 +135,7 @@ def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
         Arrays by name, shapes as in :class:`Pair`; "masters", shape (n_nodes, k), as node numbers
         of the master surface.
     """
+    pair = pair.by_nodes()
     return {name: getattr(pair, name) for name in CHANGING} | {
         "masters": _nodes_of(master, pair.masters)
     }
@@ -147,4 +151,5 @@ def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray
     """
     nodes = known["masters"]
     changed = {**known, "masters": master.dofs[nodes], "master_maps": master.maps_at(nodes)}
-    return replace(pair, **changed)
+    found = replace(pair.by_nodes(), **changed)
+    return found if pair.hierarchy is None else found.by_corners()

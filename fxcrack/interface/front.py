@@ -45,6 +45,9 @@ class Front:
         surface: Slave surface.
         bonded: Initially bonded nodes, shape (n_nodes,).
         title: Name of the interface in messages.
+        by_corners: Whether the facets are the corners of second-order triangles
+            (:mod:`fxcrack.interface.hierarchy`): a node then stands for its part of the line of the
+            front, and lengths are on one line only where nodes are.
 
     Attributes:
         surface: The slave surface where it is now (:meth:`follow`).
@@ -60,9 +63,12 @@ class Front:
         InterfaceError: A second-order tip starts at a midside node.
     """
 
-    def __init__(self, surface: FacetSurface, bonded: Bools, title: str) -> None:
+    def __init__(
+        self, surface: FacetSurface, bonded: Bools, title: str, *, by_corners: bool = False
+    ) -> None:
         self.surface = self._undeformed = surface
         self.title = title
+        self._by_corners = by_corners
         self.bonded = bonded.copy()
         self.version = 0
         self.placed = 0
@@ -242,9 +248,9 @@ class Front:
         """
         if not self._has_units:
             raise InterfaceError(
-                f"interface '{self.title}' has second-order triangular faces: no crack-closure "
-                "unit is defined on them; use first-order tetrahedra or second-order hexahedra, "
-                "or tie it (Scene(bonds=...))"
+                f"interface '{self.title}' has second-order triangular faces with a jump of its "
+                "own at every node, on which no crack-closure unit is defined: only interfaces of "
+                "Scene(debonds=...) have a front there, not those of Scene(bonds=...)"
             )
         bonded = np.flatnonzero(self.bonded & ~self._is_middle & ~self.tied)
         ends, middles = self._near
@@ -370,18 +376,35 @@ class Front:
         if growth is None:
             return self._ligament(node, s)
         d_behind, wake, weights, met = self._ray(node, -growth, s, open_side=True)
-        d_ahead, ahead, _, met_ahead = self._ray(node, growth, s, open_side=False)
+        d_ahead, ahead, at_ahead, met_ahead = self._ray(node, growth, s, open_side=False)
         if s.dim == 1:
             width = float(s.breadth[node])
             across = 0.5 * (width + float(s.breadth[ahead[0]]))
         else:
             width = across = float(s.areas[node]) / (0.5 * (d_ahead + d_behind))
         area = across * d_ahead if d_ahead > 0.0 else float(s.areas[node])
+        straight = met and met_ahead
+        if self._by_corners:
+            width = max(self._front_part(node, s), 0.5 * width)
+            straight &= bool(weights.max() == 1.0 and at_ahead.max() == 1.0)
         return Tip(
             node, np.array([node]), wake[None], weights[None], self._frame(node, growth, s),
             d_ahead, d_behind, width, area,
-            *self._further(node, wake, weights, d_behind, -growth, s), met and met_ahead,
+            *self._further(node, wake, weights, d_behind, -growth, s), straight,
         )  # fmt: skip
+
+    def _front_part(self, node: int, s: FacetSurface) -> float:
+        """Half the length of the edges at a node along which the front runs, length.
+
+        They belong to facets whose third corner is open.
+        """
+        total = 0.0
+        for facet in self._facets_of[node]:
+            corners = s.facets[facet, : s.n_corners]
+            other = corners[self.bonded[corners] & (corners != node)]
+            if len(other) == 1:
+                total += 0.5 * norm(s.x[other[0]] - s.x[node])
+        return total
 
     def _further(
         self, node: int, wake: Ints, weights: Array, d_behind: float, back: Array, s: FacetSurface

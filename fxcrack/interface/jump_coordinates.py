@@ -70,6 +70,7 @@ from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.constrained_slaves import drop_constrained
 from fxcrack.interface.following import Following
+from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
@@ -155,6 +156,10 @@ def build_coordinates(
     gdim, comm = layout.gdim, layout.comm
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
+    for pair, has_jump in zip(pairs, jumped, strict=True):
+        if pair.hierarchy is not None:
+            # loads on open faces belong to the corners as well, so that theirs are those of hats
+            pair.hierarchy.link(has_jump)
     nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=jumped, further=layout.joints.nodes)
     which, value = supports.at_nodes(nodes)
     check_slaves(pairs, jumped, nodes, which, value, supports)
@@ -344,7 +349,8 @@ def _interface_rows(
             "surfaces that continue each other, mesh.joined('whole', ['first', 'second'])"
         )
     composed = base
-    for _ in range(len(links) if not len(joined[0]) else 2 * len(links) + 1):
+    longest = links_in_chain(link.pair.hierarchy for link in links)
+    for _ in range(longest if not len(joined[0]) else 2 * longest + 1):
         composed = base + chain @ composed
     return sp.csr_matrix(composed)
 

@@ -69,6 +69,8 @@ class InterfaceNodes:
             used += [pair.surface.dofs[rows], pair.masters[rows].ravel()]
             if pair.feet is not None:
                 used.append(pair.feet[0][rows].ravel())
+            if pair.hierarchy is not None:
+                used.append(pair.hierarchy.masters[rows].ravel())
         return cls(layout, np.concatenate(used) if used else np.zeros(0, dtype=np.int64))
 
     def __len__(self) -> int:

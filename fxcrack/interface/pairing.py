@@ -10,7 +10,7 @@ whichever side is the slave (surface-to-surface, :mod:`fxcrack.interface.mortar`
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -34,6 +34,7 @@ from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.base.positions import as_marks, marks_at, numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
+from fxcrack.interface.hierarchy import Hierarchy, corner_surface, is_hierarchical, linked
 from fxcrack.interface.mortar import surface_weights
 from fxcrack.interface.projection import project
 from fxcrack.interface.roles import (
@@ -198,6 +199,10 @@ class Pair:
         exchanged: Whether the nodes are those of the side that the interface calls the master
             (:mod:`fxcrack.interface.roles`).
         whole: Slave surface with all its facets where ``surface`` has not; ``None`` where it has.
+        hierarchy: Midside nodes whose jumps are measured from those of their corners
+            (:mod:`fxcrack.interface.hierarchy`). ``surface`` consists of first-order triangles
+            then, and masters and weights of these nodes hold their corners. ``None`` where each
+            node has its own jump.
     """
 
     interface: Interface
@@ -213,6 +218,7 @@ class Pair:
     feet: tuple[Ints, Array] | None = None
     exchanged: bool = False
     whole: FacetSurface | None = None
+    hierarchy: Hierarchy | None = None
 
     @property
     def title(self) -> str:
@@ -231,13 +237,55 @@ class Pair:
         return self.whole or self.surface
 
     @property
+    def under(self) -> tuple[Ints, Array]:
+        """Masters of the whole jump of each node and their weights, each (n_nodes, k)."""
+        if self.hierarchy is None:
+            return self.masters, self.weights
+        return self.hierarchy.masters, self.hierarchy.weights
+
+    @property
+    def can_touch(self) -> Bools:
+        """Slave nodes whose normal jump contact bounds, shape (n_nodes,)."""
+        if self.hierarchy is None:
+            return self.paired
+        out = self.paired.copy()
+        out[self.hierarchy.midsides] = False
+        return out
+
+    def opened_with(self, bonded: Bools, nodes: Ints) -> Ints:
+        """Some nodes and those that come free with them, sorted, shape (k,).
+
+        Args:
+            bonded: Nodes bonded so far, shape (n_nodes,).
+            nodes: Nodes that are released, shape (m,).
+        """
+        if self.hierarchy is None:
+            return nodes
+        return np.union1d(nodes, self.hierarchy.opened_by(bonded, nodes))
+
+    def by_nodes(self) -> Pair:
+        """The same pair with a jump of its own at every node, on the same facets."""
+        if self.hierarchy is None:
+            return self
+        masters, weights = self.under
+        return replace(self, masters=masters, weights=weights, hierarchy=None)
+
+    def by_corners(self) -> Pair:
+        """The pair with jumps of midside nodes measured from those of their corners."""
+        grown = self.bonded & ~self.paired
+        hierarchy, masters, weights = linked(
+            self.whole_surface, self.paired, grown, self.masters, self.weights
+        )
+        return replace(self, masters=masters, weights=weights, hierarchy=hierarchy)
+
+    @property
     def surface_to_surface(self) -> bool:
         """Whether weights are means over facets."""
         return self.feet is not None
 
     def masters_under(self, node: int) -> Ints:
         """Global nodes whose shape functions do not vanish at the point under a slave node."""
-        masters, weights = self.feet or (self.masters, self.weights)
+        masters, weights = self.feet or self.under
         return np.asarray(masters[node][weights[node] != 0.0])
 
     def forces_on_masters(self, forces: Array) -> Array:
@@ -407,6 +455,7 @@ def make_pair(
     others: Sequence[Interface] = (),
     supported: Ints | None = None,
     by_nodes: bool = False,
+    cracks: bool = False,
 ) -> Pair:
     """Pair slave and master surface; collective, the same result on every rank.
 
@@ -420,6 +469,8 @@ def make_pair(
         by_nodes: Whether node-to-surface is the default: where bodies may have lumped masses,
             which weights below 0 would make negative, and where faces slide and are paired anew,
             which gives and takes energy with means over facets.
+        cracks: Whether the interface may come apart: second-order triangles then have hierarchical
+            jump coordinates (:mod:`fxcrack.interface.hierarchy`).
 
     Raises:
         InterfaceError: A bonded slave node lies outside the master surface, the two surfaces
@@ -457,7 +508,7 @@ def make_pair(
             interface.title,
             pairing,
             stiffness_ratio(continuum, interface.slave, interface.master),
-            fineness_ratio(slave, master, paired),
+            fineness_ratio(slave, master, foot, paired),
             may_exchange=(interface.bonded is None or callable(interface.bonded))
             and covered_whole(master, under)
             and alike
@@ -481,9 +532,11 @@ def make_pair(
         gap = np.einsum("ni,ni->n", slave.x - below, normals)
     inside = (paired | grown)[slave.facets].all(axis=1) if bonded.any() else np.ones(1, dtype=bool)
     partly = not inside.all() and inside.any()
-    return Pair(
+    surface = slave.with_facets(inside) if partly else slave
+    by_corners = cracks and is_hierarchical(slave)
+    pair = Pair(
         interface=interface,
-        surface=slave.with_facets(inside) if partly else slave,
+        surface=corner_surface(surface) if by_corners else surface,
         paired=paired,
         masters=master.dofs[nodes],
         weights=weights,
@@ -494,8 +547,13 @@ def make_pair(
         master_maps=master.maps_at(nodes),
         feet=feet,
         exchanged=role is Role.EXCHANGED,
-        whole=slave if partly else None,
+        whole=slave if partly or by_corners else None,
     )
+    if not by_corners:
+        return pair
+    pair = pair.by_corners()
+    assert pair.hierarchy is not None
+    return replace(pair, bonded=pair.hierarchy.bonded(bonded) | grown)
 
 
 def _shares_nodes(

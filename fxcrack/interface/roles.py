@@ -70,10 +70,24 @@ def stiffness_ratio(continuum: Continuum, slave: str | Face, master: str | Face)
     return found[0] / found[1] if found[1] > 0.0 else 1.0
 
 
-def fineness_ratio(slave: FacetSurface, master: FacetSurface, paired: Bools) -> float:
-    """Mean facet size of the master over that of the slave where the slave has a master."""
+def fineness_ratio(
+    slave: FacetSurface, master: FacetSurface, foot: Projection, paired: Bools
+) -> float:
+    """Mean facet size of the master over that of the slave where they lie on each other.
+
+    Args:
+        slave: Slave surface.
+        master: Master surface, of which the facets under slave nodes count.
+        foot: Projections of the slave nodes.
+        paired: Slave nodes that have a master point, shape (n_nodes,).
+    """
     inside = paired[slave.facets].all(axis=1)
-    return float(_mean_size(master) / _mean_size(slave, inside if inside.any() else None))
+    under = np.zeros(len(master.facets), dtype=bool)
+    under[foot.facet[paired]] = True
+    return float(
+        _mean_size(master, under if under.any() else None)
+        / _mean_size(slave, inside if inside.any() else None)
+    )
 
 
 def _mean_size(surface: FacetSurface, chosen: Bools | None = None) -> float:

@@ -348,7 +348,7 @@ def _symmetric_normal(pair: Pair, node: int, axes: list[Array]) -> Array:
         node: Slave node.
         axes: Directions in which supports hold the node, each of shape (gdim,).
     """
-    surface = pair.surface
+    surface = pair.whole_surface
     normal = pair.frames[node, :, 0]
     around = np.unique(surface.facets[(surface.facets == node).any(axis=1)])
     turn = np.linalg.norm(surface.normals[around] - surface.normals[node], axis=1).max()

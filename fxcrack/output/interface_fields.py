@@ -20,6 +20,7 @@ from dolfinx import fem
 
 from fxcrack.base.arrays import Array
 from fxcrack.criteria.evaluator import TipValues
+from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.nodes import InterfaceNodes, point_displacements
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 from fxcrack.steps.bond_records import bond_state
@@ -98,12 +99,14 @@ def interface_fields(
     direct = nodes.gather(residual(analysis, u))
     slaves = [nodes.find(p.surface.dofs) for p in pairs]
     masters = [nodes.find(p.masters) for p in pairs]
+    faces = [nodes.find(p.under[0]) for p in pairs]
     acting = [
         pair.paired & (front.bonded | analysis.retained_nodes(p))
         for p, (pair, front) in enumerate(zip(pairs, analysis.solver.fronts, strict=True))
     ]
     total = direct
-    for _ in range(len(pairs) - 1):  # a slave may carry other slaves: at most as long a chain
+    # a slave may carry other slaves: at most as long a chain
+    for _ in range(links_in_chain(pair.hierarchy for pair in pairs) - 1):
         carried = np.zeros_like(direct)
         for pair, s, m, on in zip(pairs, slaves, masters, acting, strict=True):
             np.add.at(carried, m[on], pair.forces_on_masters(total[s, :gdim])[on])
@@ -113,7 +116,7 @@ def interface_fields(
             analysis,
             p,
             point_displacements(motion[slaves[p]], pair.surface.point_maps),
-            point_displacements(motion[masters[p]], pair.master_maps),
+            point_displacements(motion[faces[p]], pair.master_maps),
             np.where(acting[p][:, None], total[slaves[p], :gdim], 0.0),
             analysis.time if time is None else time,
         )
@@ -127,13 +130,16 @@ def _fields_of(
     """Fields on pair p from the displacements and forces at its nodes."""
     pair, solver = analysis.pairs[p], analysis.solver
     surface = pair.surface
-    under = np.einsum("nk,nkc->nc", pair.weights, masters)
+    under = np.einsum("nk,nkc->nc", pair.under[1], masters)
     opening = np.where(pair.paired[:, None], slave - under, 0.0)
     # a component that a support holds carries the support's reaction, not a bond force
     local = np.einsum("nck,nc->nk", solver.frames[p], force)
     local[solver.held_by_supports[p]] = 0.0
     bond = np.einsum("nck,nk->nc", solver.frames[p], local)
     area = np.where(surface.areas > 0.0, surface.areas, np.inf)  # corners of second-order facets
+    traction = -in_space(bond) / area[:, None]
+    if pair.hierarchy is not None:
+        traction = pair.hierarchy.spread(traction)
     bonded = solver.fronts[p].bonded
     given = np.abs(analysis.given_forces_at(p)) > _ROUND_OFF * np.abs(local).max(initial=0.0)
     state = np.where(bonded, 1.0, np.where(given.any(axis=1), 0.5, 0.0))
@@ -157,7 +163,7 @@ def _fields_of(
     return InterfaceFields(
         displacement=in_space(slave),
         opening=in_space(opening),
-        traction=-in_space(bond) / area[:, None],
+        traction=traction,
         normal=in_space(pair.frames[:, :, 0]),
         state=state,
         front=front,

@@ -37,7 +37,7 @@ def moves_freely(
         fixed[front.bonded & pair.paired, : 1 if pair.interface.normal_only else gdim] = True
         held = fixed.copy()
         if pair.interface.contact:
-            faces = ~front.bonded & pair.paired
+            faces = ~front.bonded & pair.can_touch
             held[faces, : gdim if pair.friction is not None else 1] = True
             apart |= bool(np.any(pair.gap[faces] > _APART * pair.surface.facet_size))
         bonded.append(fixed)

@@ -104,7 +104,9 @@ class InterfaceSolver(ABC):
         self.timings = Timings()
         self.law_seconds: dict[str, float] = {}
         self.soft_counts = CohesiveCounts()
-        self.fronts = [Front(p.surface, p.bonded, p.title) for p in pairs]
+        self.fronts = [
+            Front(p.surface, p.bonded, p.title, by_corners=p.hierarchy is not None) for p in pairs
+        ]
         self.n_loads = n = len(supports.columns) + len(loads)
         self.active = [False] * len(pairs)
         self.around = [(0.0, 0.0)] * len(pairs)
@@ -317,7 +319,8 @@ class InterfaceSolver(ABC):
             components = self.index[p][nodes[row], local]
             traction = -system.forces(state, components)
             if pressed:
-                stays = (local == 0) & (traction < 0.0)
+                touch = self.pairs[p].can_touch[nodes[row]]
+                stays = (local == 0) & (traction < 0.0) & touch
                 closed = components[stays]
                 system.contact[closed] = system.closed[closed] = True
                 row, local, components, traction = (
@@ -339,7 +342,7 @@ class InterfaceSolver(ABC):
         if bonds:
             system.soften(bonds)
             if self.pairs[p].interface.contact:
-                normals = self.index[p][every, 0]
+                normals = self.index[p][every[self.pairs[p].can_touch[every]], 0]
                 system.touches[normals[normals >= 0]] = True
         self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 
@@ -354,18 +357,20 @@ class InterfaceSolver(ABC):
             NotPositiveDefinite: A body would come free; nothing is changed.
         """
         system, state = self.system, self.state
+        rubs = np.zeros(len(nodes), dtype=bool)
         if system.friction is not None and self.pairs[p].interface.contact:
-            force = release_to_contact(system, p, self.pairs[p], self.index[p], nodes, state)
-            self.fronts[p].release(nodes)
-            self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
-            return
-        components = self.components(p, nodes)
+            rubs = self.pairs[p].can_touch[nodes]
+        components = self.components(p, nodes[~rubs])
         components = components[~system.free[components]]
-        force = state.force.copy()
-        force[components] = system.forces(state, components)
+        known = system.forces(state, components)
+        force = state.force
+        if rubs.any():
+            force = release_to_contact(system, p, self.pairs[p], self.index[p], nodes[rubs], state)
+        force = force.copy()
+        force[components] = known
         system.release(components)
         self.fronts[p].release(nodes)
-        if self.pairs[p].interface.contact:
+        if self.pairs[p].interface.contact and system.friction is None:
             allow_contact(system, self.pairs[p], self.fronts[p], self.index[p])
         self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 

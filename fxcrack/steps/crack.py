@@ -88,6 +88,10 @@ class Crack:
             return True
         needed = [tips.force_nodes.ravel(), tips.wake_nodes.ravel()]
         needed += [e.needs(tips) for e in (self.evaluator, *self.watched)]
+        hierarchy = self.solver.pairs[self.p].hierarchy
+        if hierarchy is not None:
+            beside = hierarchy.beside(tips.node)
+            needed.append(beside[self.front.bonded[beside]])
         return self.solver.holds(self.p, np.concatenate(needed))
 
     def check_wake(self, tips: Tips) -> None:

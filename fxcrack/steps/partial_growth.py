@@ -78,7 +78,7 @@ def attach_ligaments(analysis: Analysis) -> None:
             "would rub; leave friction or partial=True out"
         )
     for g in analysis.active:
-        if g.front.surface.order > 1:
+        if analysis.continuum.order > 1:
             raise InputError(
                 f"interface '{g.title}': Fatigue(partial=True) is available for first-order "
                 "elements only; use them, or partial=False"

@@ -61,12 +61,18 @@ def release_tips(
 
 
 def _open(analysis: Analysis, g: Crack, nodes: Ints, values: TipValues) -> None:
-    """Open nodes by the release law of their debond: at once, cohesive, or along a ramp."""
+    """Open nodes by the release law of their debond: at once, cohesive, or along a ramp.
+
+    Midside nodes that have no tip of their own open with the corners that hold them
+    (:mod:`fxcrack.interface.hierarchy`).
+    """
     solver, time = analysis.condensed, analysis.time
+    corners = nodes
+    nodes = solver.pairs[g.p].opened_with(g.front.bonded, nodes)
     law, viscosity = g.debond.release, g.criterion.viscosity
     ramp: PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
     if g.opening_driven:
-        units = g.to_soften(nodes, values)
+        units = g.to_soften(corners, values)
         if viscosity <= 0.0:
             solver.soften(g.p, units)
             return
