@@ -283,6 +283,21 @@ def test_a_pressure_follows_the_bodies_with_nlgeom(tmp_path):
     assert abs(last["external_work"] / others["external_work"] - 1.0) > 1e-3
 
 
+def test_an_unstable_increment_is_said_in_words_of_the_deck(tmp_path, caplog):
+    """Heat of 1 % strain at once compresses elements so fast that their viscosity asks for more."""
+    step = LOADED.format(finite="NO", pressure=0, cards="*TEMPERATURE\nALL, 10.\n")
+    text = PLATE + "*DENSITY\n2.\n*EXPANSION\n1e-3\n" + step
+    deck = fx.read_deck(write(tmp_path, text))
+    assert deck.run().reason.startswith("stopped")
+    assert "SCALE FACTOR=0.8 " in caplog.text and "*BULK VISCOSITY with 0., 0." in caplog.text
+    assert "UNSTABLE GROWTH" not in caplog.text
+    deck.scene.close()
+    slower = text.replace("EXPLICIT\n", "EXPLICIT, SCALE FACTOR=0.8\n")
+    deck = fx.read_deck(write(tmp_path, slower))
+    assert not deck.run().reason.startswith("stopped")
+    deck.scene.close()
+
+
 def test_sudden_heat_lets_a_plate_swing_about_its_new_length(tmp_path):
     """A free plate of the same expansion everywhere: waves of 2 alpha T L at most, mean alpha T."""
     cards = "*TEMPERATURE\nALL, 1.\n*NODE PRINT, NSET=RIGHT\nU1\n"

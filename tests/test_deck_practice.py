@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -193,14 +195,22 @@ def test_supports_of_bonded_nodes(tmp_path):
 
 
 def test_a_step_that_stops_ends_the_analysis(tmp_path, caplog):
-    """No cutback reaches the tolerance: later steps are not run, and the deck's words are given."""
-    tight = VCCT.replace("TYPE=VCCT", "TYPE=VCCT, TOLERANCE=1E-9").replace("0.5, 1.0", "1E-3, 1.0")
-    text = bonded(tight) + OPENED.format(criterion=tight)
+    """Unstable under dead load: later steps are not run, and the deck's words are given."""
+    step = OPENED[: OPENED.index("11, 1, 1")] + "14, 1, 2\n15, 1, 2\n24, 1, 2\n25, 1, 2\n"
+    step += "*CLOAD\n11, 2, 100.\n21, 2, -100.\n" + OPENED[OPENED.index("*DEBOND") :]
+    text = bonded(step=step) + step.format(criterion=VCCT)
     deck = fx.read_deck(write(tmp_path, text))
     history = deck.run(progress=False)
-    assert history.reason.startswith("stopped")
     assert float(history["time"].max()) < 1.0
-    assert "UNSTABLE GROWTH TOLERANCE" in caplog.text
+    f = float(re.search(r"stopped: f = ([0-9.e+-]+) after 5 cutbacks", history.reason)[1])
+    said = re.search(r"UNSTABLE GROWTH TOLERANCE=([0-9.e+-]+) at least", caplog.text)
+    assert float(said[1]) == pytest.approx(1.1 * (f - 1.0), rel=0.06)
+    assert "*FRACTURE CRITERION (without a value it has no limit" in caplog.text
+    deck.scene.close()
+    given = VCCT.replace("TYPE=VCCT", "TYPE=VCCT, UNSTABLE GROWTH TOLERANCE")
+    deck = fx.read_deck(write(tmp_path, bonded(given, step=step)))
+    history = deck.run(progress=False)
+    assert not history.reason.startswith("stopped") and history.rows[-1]["released[TOP]"] >= 2
     deck.scene.close()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any, cast
 
@@ -10,6 +11,7 @@ from mpi4py import MPI
 from fxcrack.base import log
 from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.deck.cards import DeckError
+from fxcrack.deck.explicit import SAFETY
 from fxcrack.deck.model import read_model
 from fxcrack.deck.procedures import DeckStep
 from fxcrack.deck.reader import read_cards
@@ -20,6 +22,7 @@ from fxcrack.history import History
 from fxcrack.mesh.distribute import distribute
 from fxcrack.mesh.raw import on_root
 from fxcrack.scene import Scene
+from fxcrack.steps.explicit import Explicit
 
 
 class Deck:
@@ -56,7 +59,7 @@ class Deck:
         """
         for step in self.steps:
             history = self.run_step(step, **options)
-            if stopped(history):
+            if stopped(history, step):
                 break
         return self.scene.history
 
@@ -72,20 +75,37 @@ class Deck:
         return self.scene.run(step.step, grow=[by_title[n] for n in step.grow], **options)
 
 
-def stopped(history: History) -> bool:
+def stopped(history: History, step: DeckStep) -> bool:
     """Whether the last step ended before its time: the steps after it have no state to begin with.
 
     It is said with what would help in the words of a deck.
     """
     if not history.reason.startswith("stopped"):
         return False
-    log.warn(
-        "the analysis ends with this step; in a deck, UNSTABLE GROWTH TOLERANCE or a larger "
-        "TOLERANCE of *FRACTURE CRITERION lets several nodes debond in one increment, *CONTROLS, "
+    log.warn("the analysis ends with this step; in a deck, %s", _help(history.reason, step))
+    return True
+
+
+def _help(reason: str, step: DeckStep) -> str:
+    """What would help, by cards and parameters."""
+    if isinstance(step.step, Explicit):
+        return (
+            "SCALE FACTOR of *DYNAMIC, EXPLICIT gives smaller increments (it is the safety over "
+            f"{SAFETY:g}: SCALE FACTOR={0.8 * step.step.safety / SAFETY:.2g} for increments 0.8 "
+            "times as long), and *BULK VISCOSITY with 0., 0. leaves out the viscosity that "
+            "shortens the stable increment"
+        )
+    reached = re.search(r"\bf = ([0-9.e+-]+) ", reason)
+    least = ""
+    if reached:
+        value = max(1.1 * (float(reached[1]) - 1.0), 1e-3)
+        least = f"; f = {reached[1]} asks for UNSTABLE GROWTH TOLERANCE={value:.2g} at least"
+    return (
+        "UNSTABLE GROWTH TOLERANCE of *FRACTURE CRITERION (without a value it has no limit"
+        f"{least}) or a larger TOLERANCE lets several nodes debond in one increment, *CONTROLS, "
         "PARAMETERS=TIME INCREMENTATION (eighth field, I_A) allows more cutbacks, and INC of *STEP "
         "more increments"
     )
-    return True
 
 
 def read_deck(
@@ -112,13 +132,14 @@ def read_deck(
         None if found is None else (found.arguments, found.steps, found.report, found.nodes)
     )
     arguments, steps, report, nodes = shared
-    for line in report.replaced:
-        log.warn("%s", line)
     mesh = distribute(raw, comm, Path(path).stem)
     try:
         scene = Scene(mesh, **arguments)
     except InputError as error:
         raise DeckError(f"{Path(path).name}: {error}") from error
+    finally:  # after the scene is made, whose report holds the warnings since then
+        for line in report.replaced:
+            log.warn("%s", line)
     return Deck(scene, steps, report, nodes)
 
 

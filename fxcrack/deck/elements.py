@@ -98,6 +98,8 @@ class ElementType:
         n_nodes: Nodes the deck gives for each element.
         notes: What is computed in another way than the type says.
         stacked: Whether it is a continuum shell: plies lie from its face S1 to its face S2.
+        bends_freely: Whether it is of first order and bends without locking in the deck's
+            formulation, which plain elements of full integration do not.
     """
 
     name: str
@@ -107,6 +109,7 @@ class ElementType:
     n_nodes: int
     notes: tuple[str, ...] = ()
     stacked: bool = False
+    bends_freely: bool = False
 
     @property
     def gdim(self) -> int:
@@ -149,7 +152,9 @@ def element_type(name: str) -> ElementType | str:
         suffix = match[3]
         if shape and set(suffix) <= set("RIHM") and len(set(suffix)) == len(suffix):
             cell, order = shape
-            return ElementType(name, cell, order, _MODELS[family], n, _notes(cell, order, suffix))
+            free = order == 1 and bool(set(suffix) & set("RI"))
+            notes = _notes(cell, order, suffix)
+            return ElementType(name, cell, order, _MODELS[family], n, notes, bends_freely=free)
     for pattern, words in _REFUSED:
         if re.match(pattern, name):
             return words
@@ -164,17 +169,11 @@ def element_type(name: str) -> ElementType | str:
 def _notes(cell: str, order: int, suffix: str) -> tuple[str, ...]:
     """What is computed in another way."""
     plural = {"tetrahedron": "tetrahedra", "hexahedron": "hexahedra"}.get(cell, f"{cell}s")
-    shape = f"{'first' if order == 1 else 'second'}-order {plural}"
-    stiff = (
-        "; they are stiffer in bending, which read_deck(..., order=2) or --order 2 avoids"
-        if order == 1
-        else ""
-    )
     words = {
-        "R": f"reduced integration is replaced by full integration of {shape}{stiff}",
-        "I": f"incompatible modes are replaced by plain {shape}{stiff}",
-        "H": f"the hybrid formulation is replaced by displacements alone, {shape}",
-        "M": f"the modified formulation is replaced by plain {shape}",
+        "R": f"reduced integration is replaced by full integration of plain {plural}",
+        "I": f"incompatible modes are replaced by full integration of plain {plural}",
+        "H": f"the hybrid formulation is replaced by displacements alone, plain {plural}",
+        "M": f"the modified formulation is replaced by plain {plural}",
     }
     notes = [words[letter] for letter in suffix]
     if order == 2 and cell in ("quadrilateral", "hexahedron"):

@@ -68,7 +68,7 @@ def run_deck(
         observers = [tips] if any(step.frequency.values()) else []
         history = deck.run_step(step, save=out / "history.csv", observers=observers)
         console.print(f"step '{step.name}': {history.reason}", markup=False, soft_wrap=True)
-        if stopped(history):
+        if stopped(history, step):
             break
     history = deck.scene.history
     (with_usual_names(history) if usual_names else history).to_csv(out / "history.csv")

@@ -34,6 +34,7 @@ from fxcrack.deck.rules import (
 from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
+from fxcrack.deck.thickness import thickness_of
 from fxcrack.deck.tips import NodeNames
 from fxcrack.deck.tracks import Amplitudes
 from fxcrack.deck.velocity import StartingVelocity, starting_velocity
@@ -102,6 +103,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     flat = Flat(model, _order(model, report, order, explicit=explicit))
     if flat.kind.shell:
         check_normals(flat)
+    _warn_of_locking(flat, report, explicit=explicit)
     groups = Groups(flat)
     cards = _model_cards(flat)
     _check_steps(model.steps, explicit=explicit)
@@ -206,6 +208,33 @@ def _order(model: Model, report: Report, order: int | None, *, explicit: bool) -
         blocks[0].card,
     )
     return 2
+
+
+def _warn_of_locking(flat: Flat, report: Report, *, explicit: bool) -> None:
+    """Say what full integration of first-order elements costs in bending, and what avoids it."""
+    spaces = [flat.model.root, *flat.model.instances.values()]
+    blocks = [b for space in spaces for b in space.elements.values() if b.kind.bends_freely]
+    if not blocks or flat.kind.order != 1:
+        return
+    found = thickness_of(flat.kind.cell, flat.points, flat.cells)
+    known = ""
+    if found is not None:
+        elements = f"{found.number} element" + ("s" if found.number > 1 else "")
+        known = (
+            f": with {elements} over the smallest dimension of the bodies, {found.aspect:.3g} "
+            f"times as long as high, by about {100.0 * found.excess:.2g} % (rectangles, nu = 0.3)"
+        )
+    help_ = (
+        "explicit dynamics has no second order: mesh the thickness with more elements"
+        if explicit
+        else "--order 2 or read_deck(..., order=2) avoids it"
+    )
+    names = ", ".join(sorted({block.kind.name for block in blocks}))
+    report.replace(
+        f"first-order elements of full integration in place of {names} lock in bending, where "
+        f"they are too stiff{known}; {help_}",
+        blocks[0].card,
+    )
 
 
 def _model_cards(flat: Flat) -> list[Card]:
