@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fxcrack.base.checks import as_float, list_of, number, shown
 from fxcrack.base.errors import MeshError
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.beam import name_ends
@@ -129,7 +130,16 @@ def _two_stacks(
     order: int,
 ) -> Blocks:
     """The plies above and below the crack plane, each a body with a group of cells per ply."""
-    thickness = [float(t) for t in plies]
+    given = [] if isinstance(plies, str) else list_of(plies)
+    if not given:
+        raise MeshError(
+            f"plies = {shown(plies)} must be the thicknesses of two plies or more, bottom first, "
+            "such as Laminate.thicknesses"
+        )
+    thickness = [number("laminate", f"plies[{i}]", t) for i, t in enumerate(given)]
+    layers = as_float(per_ply)
+    if layers is None or not layers.is_integer():
+        raise MeshError(f"per_ply = {shown(per_ply)} must be a whole number of layers of cells")
     positive(per_ply=per_ply, **{f"plies[{i}]": t for i, t in enumerate(thickness)})
     if isinstance(crack, bool) or crack != int(crack) or not 0 < crack < len(thickness):
         raise MeshError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from fxcrack.base.checks import list_of, number, shown
 from fxcrack.base.errors import MeshError
 
 Floats = npt.NDArray[np.float64]
@@ -111,7 +112,10 @@ def fine_region(
         return x
     if fine is None:
         return even(0.0, stop, dx)
-    low, high = fine
+    ends = list_of(fine)
+    if ends is None or len(ends) != 2:
+        raise MeshError(f"fine = {shown(fine)} must be both ends of the fine region, (20.0, 40.0)")
+    low, high = (number("mesh", "an end of the fine region", end) for end in ends)
     if not 0.0 <= low < high <= stop:
         raise MeshError(f"the fine region {low:g} to {high:g} must lie between 0 and {stop:g}")
     largest = 8.0 * dx if coarse_dx is None else coarse_dx

@@ -316,6 +316,10 @@ def test_free_references_are_named() -> None:
             ],
             "in a circle",
         ),
+        (
+            [fx.Equation((("end", "x", 1.0), ("end", "x", -1.0)), value=1.0)],
+            r"Equation\('end'\): its terms cancel",
+        ),
     ],
 )  # fmt: skip
 @pytest.mark.mpi
@@ -330,6 +334,8 @@ def test_contradictions(supports: list[Any], words: str) -> None:
         lambda: fx.Coupling("a", (1.0,)),
         lambda: fx.Coupling("a", (1.0, 2.0), x="b"),  # type: ignore[arg-type]
         lambda: fx.Coupling("a", (1.0, 2.0), components="xq"),
+        lambda: fx.Coupling("a", (1.0, 2.0), x=0.0, mean=True, weight=0.0),
+        lambda: fx.Coupling("a", (1.0, 2.0), x=0.0, mean=True, weight=-1.0),
         lambda: fx.Equation((("a", "x", 1.0),)),
         lambda: fx.Equation((("a", "x", 0.0), ("b", "x", 1.0))),
         lambda: fx.Equation((("a", "q", 1.0), ("b", "x", 1.0))),

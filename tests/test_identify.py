@@ -6,6 +6,7 @@ Where no finite elements are needed the response is that of corrected beam theor
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -338,6 +339,7 @@ def test_a_file_is_read_whatever_its_separator(tmp_path: Path):
         ("opening,load\n1,2\n2,x\n3,4\n", "line 3: load = 'x' is not a finite number"),
         ("opening,load\n1,2\n2,nan\n3,4\n", "line 3: load = 'nan'"),
         ("opening,load\n1,2\n2\n3,4\n", "line 3: load = ''"),
+        ("opening,load\n0,1,5,0\n0,2,9,0\n0,3,9,5\n", "line 2 has 4 values for 2 columns"),
         ("opening,load,load\n1,2,3\n", "names 2 columns 'load'"),
         ("opening,load\n1,2\n", "1 points; at least three"),
         ("opening,load\n-1,-2\n-2,-3\n-3,-4\n", "turn the signs"),
@@ -443,8 +445,19 @@ def test_scenes_whose_loads_do_not_scale_are_refused():
         identify.linear_response(scene, fx.CrackLength(bond, ends), back)
     with pytest.raises(fx.InputError, match="run already"):
         identify.linear_response(scene, fx.CrackLength(bond, ends), AXES)
-    scene.close()
-    other.close()
+    # a preload that the first state balances: no opening there, compliances 0 and not 0
+    pull = fx.PointForce("pin_top", (0.0, 1.0), amplitude=fx.constant())
+    preloaded = scene.rebuilt(loads=[pull])
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        with pytest.raises(fx.InputError, match="is not proportional"):
+            identify.linear_response(preloaded, fx.CrackLength(bond, ends), AXES)
+    same_name = fx.Interface("upper_face", "lower_face", bonded=lambda x: x[0] > 20.0, name="b")
+    again = scene.rebuilt()
+    with pytest.raises(fx.InputError, match="another Interface that is called 'b'"):
+        again.run(fx.Static(until=fx.CrackLength(same_name, ends)))
+    for made in (scene, other, preloaded, again):
+        made.close()
 
 
 def test_the_picture_and_the_words_say_what_was_found(tmp_path: Path):

@@ -102,3 +102,5 @@ def test_groups_that_cannot_be_joined(parts: Any, words: str) -> None:
         mesh.joined("up", parts)
     with pytest.raises(MeshError, match="has a group 'up east' already"):
         mesh.joined("up east", ["up west"])
+    with pytest.raises(MeshError, match="name = 5 must be a text"):
+        mesh.joined(5, ["up west"])  # type: ignore[arg-type]

@@ -92,6 +92,12 @@ def test_a_laminate_in_space_is_the_same_on_several_ranks():
         ({"crack": 1.5}, "crack = 1.5"),
         ({"plies": (0.1, 0.0)}, r"plies\[1\] must be positive"),
         ({"per_ply": 0}, "per_ply must be positive"),
+        ({"per_ply": 1.5}, "per_ply = 1.5 must be a whole number"),
+        ({"plies": 3}, "thicknesses of two plies or more"),
+        ({"plies": "ab"}, "thicknesses of two plies or more"),
+        ({"plies": ()}, "thicknesses of two plies or more"),
+        ({"plies": (1.0, "b")}, r"plies\[1\] = 'b' is not a number"),
+        ({"fine": 50.0}, "both ends of the fine region"),
     ],
 )
 def test_what_cannot_be_meshed_is_refused(arguments: dict[str, object], words: str):

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fxcrack.base.checks import flag, keep, list_of, number, number_or_function, text
+from fxcrack.base.checks import (
+    flag,
+    is_function,
+    keep,
+    list_of,
+    number,
+    number_or_function,
+    positive,
+    text,
+)
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.loads import AmplitudeLike, Field, Ramp
 
@@ -44,13 +53,13 @@ class Coupling:
         components: Displacement components of the nodes that follow; the others stay free.
         rotations: Whether the directors of shells turn with the point.
         mean: Whether the mean motion follows, in place of every node.
-        weight: Weights of the nodes in the mean, a number or a function of position; any factor of
-            all of them cancels.
+        weight: Weights of the nodes in the mean, a positive number or a function of position; any
+            factor of all of them cancels.
         amplitude: Factor in time; motions that are 0 stay 0.
         name: What the history calls it; the group's name by default.
 
     Raises:
-        InputError: A number is none, or nothing follows.
+        InputError: A number is none, a weight is not positive, or nothing follows.
     """
 
     where: str
@@ -83,6 +92,8 @@ class Coupling:
                 keep(self, **{motion: number(owner, motion, value)})
         flag(owner, "mean", self.mean)
         number_or_function(owner, "weight", self.weight)
+        if not is_function(self.weight):
+            positive(owner, weight=self.weight)
         text(owner, "components", self.components)
         if not set(self.components) <= set("xyz"):
             raise InputError(

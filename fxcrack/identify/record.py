@@ -148,8 +148,8 @@ def read_record(
         name: What messages call the test; the file's name by default.
 
     Raises:
-        InputError: The file cannot be read, a column is missing, or a line holds no number where
-            one is needed; the message names the line.
+        InputError: The file cannot be read, a column is missing, or a line has more values than
+            there are columns or no number where one is needed; the message names the line.
     """
     path = Path(path)
     try:
@@ -174,6 +174,11 @@ def read_record(
     values: dict[str, list[float]] = {column: [] for column in wanted}
     for n, line in kept[1:]:
         cells = next(csv.reader([line], delimiter=separator))
+        if any(cell.strip() for cell in cells[len(names) :]):
+            raise InputError(
+                f"read_record: '{path}', line {n} has {len(cells)} values for {len(names)} columns"
+                "; where a comma is the decimal point, separate values by semicolons or tabs"
+            )
         for column in wanted:
             place = names.index(column)
             cell = cells[place].strip() if place < len(cells) else ""

@@ -248,7 +248,8 @@ def _check_proportional(a: Array, opening: Array, load: Array, rate: Array) -> N
         p = load[i : i + 2]
         pairs = {"opening/load": opening[i : i + 2] / p, "G/load^2": rate[i : i + 2] / p**2}
         for what, value in pairs.items():
-            off = abs(value[1] / value[0] - 1.0)
+            # the larger one is zero only if both are
+            off = abs(value[1] - value[0]) / (np.abs(value).max() or 1.0)
             if off > PROPORTIONAL * scale / apart:
                 raise InputError(
                     f"linear_response: {what} at the crack length {a[i]:g} differs by {off:.2g} "

@@ -330,6 +330,11 @@ class _Rows:
     ) -> None:
         """The row of an equation between single dofs: the first that no support holds follows."""
         terms = {dof: factor for dof, factor in terms.items() if factor != 0.0}
+        if not terms and equation.value:
+            raise InputError(
+                f"{owner}: its terms cancel, so that its value {equation.value:g} cannot be "
+                "reached; let them name different nodes or axes"
+            )
         free = [dof for dof in terms if held[dof][0] < 0]
         if free:
             dof = free[0]

@@ -95,6 +95,8 @@ class Mesh:
         Raises:
             MeshError: There are no parts, a name is unknown or taken, or dimensions differ.
         """
+        if not isinstance(name, str) or not name:
+            raise MeshError(f"joined: name = {name!r} must be a text; give the name of the group")
         if not parts or isinstance(parts, str):
             raise MeshError(f"joined('{name}'): give a list of names of groups, ['west', 'east']")
         if name in self.groups:

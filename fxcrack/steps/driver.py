@@ -208,9 +208,16 @@ def _crack_of(analysis: Analysis, end: CrackLength) -> Crack:
     for g in analysis.active:
         if g.debond.interface is end.interface:
             return g
+    title = end.interface.title
+    if any(g.title == title for g in analysis.active):
+        raise InputError(
+            f"CrackLength was given another Interface that is called '{title}' as well; give it "
+            "the one that the Debond of this scene has"
+        )
+    known = ", ".join(f"'{g.title}'" for g in analysis.active) or "none"
     raise InputError(
-        f"CrackLength names interface '{end.interface.title}', which has no active Debond in "
-        "this step"
+        f"CrackLength names interface '{title}', which has no active Debond in this step; those "
+        f"that have one: {known}"
     )
 
 
