@@ -173,6 +173,10 @@ def test_large_rotations_friction_and_ties(tmp_path):
         ),
         ({"supports": [*PINS, fx.Displacement("far_upper", y=lambda x: x[0])]}, "of position"),
         ({"loads": [fx.Pressure("top", 1.0, follows=True)]}, "follows=True"),
+        (
+            {"loads": [fx.Pressure("bond", 1.0, name="fluid", follows_crack=True)]},
+            "pressure 'fluid' with follows_crack",
+        ),
         ({"loads": [fx.Pressure("top", lambda x: x[0])]}, "as a function of position"),
         ({"effects": [fx.Temperature(20.0)]}, "the effect Temperature"),
         ({"order": 2}, "a displacement of order 2 on elements of order 1"),

@@ -380,6 +380,9 @@ class _Writer:
     def _load(self, load: Load) -> list[str]:
         if isinstance(load, Moment | PointMoment):
             refuse(f"the load {type(load).__name__}('{load.title}')")
+        if isinstance(load, Pressure) and load.follows_crack:
+            # it names an interface, which is no group of the mesh
+            refuse(f"pressure '{load.title}' with follows_crack")
         name = self._amplitude(load.amplitude)
         title = load.title
         values = load.value if isinstance(load.value, tuple | list) else [load.value]
@@ -402,8 +405,6 @@ class _Writer:
         if title != load.where and self.mesh is not None:
             self.sets += self._body.surface(title, self.mesh.groups[_group(load.where)][1])
         if isinstance(load, Pressure):
-            if load.follows_crack:
-                refuse(f"pressure '{title}' with follows_crack")
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
             if load.follows != finite:
                 refuse(
