@@ -139,6 +139,18 @@ def entities_from_vertices(
     return found
 
 
+def geometry_of_entities(
+    domain: dolfinx.mesh.Mesh, dim: int, entities: npt.NDArray[np.int32]
+) -> npt.NDArray[np.int32]:
+    """Geometry nodes of entities, shape (n, k): corners first.
+
+    DOLFINx 0.9 divides by the number of entities, so that a rank without any ends in a signal.
+    """
+    if not len(entities):
+        return np.zeros((0, dim + 1), dtype=np.int32)
+    return np.asarray(dolfinx.mesh.entities_to_geometry(domain, dim, entities))
+
+
 def coordinate_map(domain: dolfinx.mesh.Mesh) -> Any:
     """Coordinate element of a mesh of one cell type (``degree``, ``create_dof_layout()``)."""
     geometry = domain.geometry

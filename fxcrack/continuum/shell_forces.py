@@ -13,8 +13,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
+
 import dolfinx.fem.petsc
-import dolfinx.mesh
 import numpy as np
 import numpy.typing as npt
 import ufl
@@ -102,7 +103,7 @@ def _check_no_joint(shell: ShellBodies, edges: npt.NDArray[np.int32], title: str
     domain, joints = shell.mesh.domain, shell.mesh.joints
     domain.topology.create_connectivity(1, 2)
     mine = edges[edges < domain.topology.index_map(1).size_local]
-    points = dolfinx.mesh.entities_to_geometry(domain, 1, mine)[:, :2].reshape(-1, 2)
+    points = compat.geometry_of_entities(domain, 1, mine)[:, :2]
     node = np.asarray(domain.geometry.input_global_indices)[points]
     by_node = np.argsort(joints[:, 0])
     place = np.minimum(np.searchsorted(joints[by_node, 0], node), len(joints) - 1)
