@@ -13,6 +13,8 @@ from fxcrack.base.checks import is_function, list_of
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.linear_range import warn_of_range
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.effects import is_finite
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Details, Row
@@ -160,6 +162,11 @@ def run_step(
     except NotPositiveDefinite as error:
         raise SolverError(held_by_contact(error.why)) from error
     analysis.history.details = _details(analysis)
+    if analysis.linear and not isinstance(step, Explicit):
+        if not isinstance(analysis.continuum, ShellBodies):
+            u = analysis.solver.displacement()
+            warn_of_range(analysis.continuum, u.array_r.copy(), analysis.said)
+            u.destroy()
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
         u = analysis.solver.displacement()

@@ -97,7 +97,8 @@ def curve_of_openings_ends() -> None:
 
 def curve_of_lengths_ends() -> None:
     curve = fx.CrackLengthVsTime((0.0, 1.0), (0.5, 1.25), reference="upper_face")
-    scene = plate(curve)
+    little = fx.Displacement("bottom", x=0.0, y=0.0), fx.Displacement("top", x=0.0, y=1e-3)
+    scene = plate(curve, supports=list(little))
     history = run(scene, fx.Releases(100))
     assert history.reason == "the curves of crack length against time have ended"
     assert history["time"][-1] == 1.0

@@ -5,13 +5,16 @@ from __future__ import annotations
 import logging
 import re
 
+import numpy as np
 import pytest
 from mpi4py import MPI
 from specimens import FORCES, HELD_FAR, PINS, STEEL, grow_to, interface_of, specimen
 
 import fxcrack as fx
+from fxcrack.continuum.cell_gradients import CellGradients
+from fxcrack.continuum.linear_range import error_of_triangles, largest_rotation
 from fxcrack.error_estimate import Estimate
-from fxcrack.meshes.dcb import dcb_2d
+from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 
 
 def plate(comm: MPI.Comm, length: float = 60.0) -> fx.Mesh:
@@ -79,3 +82,79 @@ def test_accuracy_recommends_order_and_size(
     error = difference * (2.0 if order == 1 else 1.0)
     estimate = Estimate(error, error, 0.0, None, order, 1.0, difference, "bond", simplices)
     assert re.search(words, estimate.remedy(0.01))
+
+
+def opened(
+    scene: fx.Scene, times: tuple[float, ...], caplog: pytest.LogCaptureFixture
+) -> list[str]:
+    """What is warned of at the ends of steps without growth."""
+    for time in times:
+        scene.run(fx.Static(until=fx.Time(time)), grow=[], progress=False)
+    return [m for m in caplog.messages if "rotations as small" in m or "triangles jump" in m]
+
+
+@pytest.mark.mpi
+def test_rotations_that_are_not_small(
+    comm: MPI.Intracomm, caplog: pytest.LogCaptureFixture
+) -> None:
+    """A slender arm under an opening d turns by 3 d/(2 a) at its end, 30 long here."""
+    scene = specimen(plate(comm, 40.0), order=2)
+    assert not opened(scene, (3.0,), caplog)  # 0.15
+    messages = opened(scene, (6.0, 6.5), caplog)  # 0.3
+    assert len(messages) == (comm.rank == 0)
+    u = scene.solver.displacement()
+    cells = CellGradients.of(scene.continuum, u.array_r.copy())
+    u.destroy()
+    # the middle of the last cell, 2 long, has not all of it; the arms are held elastically
+    assert largest_rotation(scene.continuum, cells) == pytest.approx(0.325, rel=0.05)
+    for message in messages:
+        assert "up to 0.29 radians" in message and "about 4." in message
+        assert "FiniteStrain()" in message
+    scene.close()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_a_rotation_is_measured_exactly(comm: MPI.Intracomm, dimension: int) -> None:
+    mesh = plate(comm) if dimension == 2 else dcb_3d(comm, length=6.0, dx=2.0, dy=10.0, ny=1)
+    scene = specimen(mesh, a0=2.0, order=2)
+    x = scene.continuum.positions()[: scene.continuum.n_local // dimension]
+    turn = np.array([0.0, 0.0, 0.3] if dimension == 2 else [0.1, 0.2, 0.2])
+    u = (np.cross(turn, x) + 0.01 * x)[:, :dimension]
+    cells = CellGradients.of(scene.continuum, u.ravel())
+    # an angle vector (0.1, 0.2, 0.2) is 0.3 long; stretching by 1 % does not turn
+    assert largest_rotation(scene.continuum, cells) == pytest.approx(0.3, rel=1e-12)
+    scene.close()
+
+
+@pytest.mark.mpi
+@pytest.mark.parametrize("ny", [2, 4])
+def test_triangles_in_bending(
+    comm: MPI.Intracomm, caplog: pytest.LogCaptureFixture, ny: int
+) -> None:
+    """The part of the energy that is error is what second order on the same mesh does without."""
+    mesh = dcb_2d(comm, length=60.0, dx=1.0, ny=ny, cell="triangle")
+    stiff, soft = specimen(mesh), specimen(mesh, order=2)
+    messages = opened(stiff, (0.5, 1.0), caplog)
+    assert len(messages) == (comm.rank == 0)
+    u = stiff.solver.displacement()
+    part = error_of_triangles(stiff.continuum, CellGradients.of(stiff.continuum, u.array_r.copy()))
+    u.destroy()
+    caplog.clear()
+    assert not opened(soft, (1.0,), caplog)
+    energy = [float(s.history.rows[-1]["strain_energy"]) for s in (stiff, soft)]
+    # the estimate is one: it is within a few percent of the whole energy at this error
+    assert part == pytest.approx(1.0 - energy[1] / energy[0], abs=0.05)
+    for message in messages:
+        assert f"and {part:.2g} of the strain energy" in message and "order=2" in message
+    stiff.close()
+    soft.close()
+
+
+def test_triangles_without_bending(caplog: pytest.LogCaptureFixture) -> None:
+    """A strip between two rails: 1.5 % too stiff, which is not worth a word."""
+    rails = [fx.Displacement("top", x=0.0, y=1.0), fx.Displacement("bottom", x=0.0, y=-1.0)]
+    mesh = dcb_2d(MPI.COMM_SELF, length=20.0, dx=0.5, ny=4, cell="triangle")
+    scene = specimen(mesh, a0=8.0, supports=rails)
+    assert not opened(scene, (1e-2,), caplog)
+    scene.close()

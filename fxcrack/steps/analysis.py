@@ -109,6 +109,7 @@ class Analysis:
         fatigue: What cycles leave behind for later ones.
         started: Whether there is an equilibrium yet.
         stabilise: The weak foundation of bodies, as the user gave it.
+        said: What was warned of at the end of a step, each once.
     """
 
     continuum: Continuum
@@ -125,6 +126,7 @@ class Analysis:
     fatigue: FatigueState = field(default_factory=FatigueState)
     started: bool = False
     stabilise: Stabilise | None = None
+    said: set[str] = field(default_factory=set)
 
     # -- what it consists of -------------------------------------------------------------
 
