@@ -163,10 +163,12 @@ def test_faces_that_slide_keep_the_energy_balance() -> None:
 @pytest.mark.slow
 def test_so_do_faces_that_slide_with_inertia() -> None:
     _, history = slid(MPI.COMM_SELF, 2.0, 0.05, fx.Inertia(density=1e-3))
-    assert history.rows[-1]["pairing_energy"] > 0.0
-    # as at rest; measured 1.1e-6
     work = np.abs(history["external_work"]).max()
-    assert np.abs(history["balance"]).max() < 1e-4 * work
+    taken = np.abs(history["pairing_energy"].astype(float)).max()
+    # of either sign in motion, as overlap that a new pairing leaves is pushed out; measured 0.02
+    assert 0.0 < taken < 0.1 * work
+    # measured 1.2e-11
+    assert np.abs(history["balance"]).max() < 1e-8 * work
 
 
 def test_an_increment_that_is_undone_gives_the_old_pairing_back() -> None:

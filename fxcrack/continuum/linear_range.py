@@ -56,7 +56,7 @@ def error_of_triangles(continuum: Continuum, cells: CellGradients) -> float:
     for part in continuum.part_cells:
         mine = part[part < len(cells.volume)]
         volume, nodes = cells.volume[mine], cells.nodes[mine]
-        e = strain[mine].reshape(len(mine), -1)
+        e = strain[mine].reshape(len(mine), continuum.gdim**2)
         sums = dolfinx.la.vector(index_map, size)
         table = sums.array.reshape(-1, size)
         table[:] = 0.0
