@@ -24,6 +24,7 @@ from fxcrack.interface.supports import tell_of_held_bonds
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.explicit import ExplicitSolver
+from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
@@ -162,8 +163,10 @@ def run_step(
     except NotPositiveDefinite as error:
         raise SolverError(held_by_contact(error.why)) from error
     analysis.history.details = _details(analysis)
-    if analysis.linear and not isinstance(step, Explicit):
-        if not isinstance(analysis.continuum, ShellBodies):
+    if isinstance(analysis.solver, LinearSolver) and not isinstance(step, Explicit):
+        # not worth a factorisation of its own, which a direct solver needs on several ranks
+        known = analysis.solver.recovers_displacement
+        if known and not isinstance(analysis.continuum, ShellBodies):
             u = analysis.solver.displacement()
             warn_of_range(analysis.continuum, u.array_r.copy(), analysis.said)
             u.destroy()

@@ -101,7 +101,8 @@ def test_rotations_that_are_not_small(
     scene = specimen(plate(comm, 40.0), order=2)
     assert not opened(scene, (3.0,), caplog)  # 0.15
     messages = opened(scene, (6.0, 6.5), caplog)  # 0.3
-    assert len(messages) == (comm.rank == 0)
+    # on several ranks it would take a factorisation of its own
+    assert len(messages) == (comm.size == 1)
     u = scene.solver.displacement()
     cells = CellGradients.of(scene.continuum, u.array_r.copy())
     u.destroy()
@@ -136,7 +137,8 @@ def test_triangles_in_bending(
     mesh = dcb_2d(comm, length=60.0, dx=1.0, ny=ny, cell="triangle")
     stiff, soft = specimen(mesh), specimen(mesh, order=2)
     messages = opened(stiff, (0.5, 1.0), caplog)
-    assert len(messages) == (comm.rank == 0)
+    # on several ranks it would take a factorisation of its own
+    assert len(messages) == (comm.size == 1)
     u = stiff.solver.displacement()
     part = error_of_triangles(stiff.continuum, CellGradients.of(stiff.continuum, u.array_r.copy()))
     u.destroy()

@@ -140,7 +140,8 @@ def _once(solver: ExplicitSolver) -> Callable[[], Any]:
     bodies = solver.bodies
     if not bodies.linear:
         return bodies.forces
-    matrix, u = bodies.stiffness(), bodies.u.x.array.copy()
+    matrix = bodies.stiffness()
+    u = bodies.columns().copy()
     return lambda: matrix @ u
 
 

@@ -23,8 +23,9 @@ from petsc4py import PETSc
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.halo import Halo
 from fxcrack.condensation.block_cg import block_cg
-from fxcrack.condensation.block_matrix import Block, BlockMatrix, Halo
+from fxcrack.condensation.block_matrix import Block, BlockMatrix
 from fxcrack.condensation.multigrid import Multigrid
 from fxcrack.condensation.rigid_motions import rigid_motions
 from fxcrack.continuum.continuum import Continuum

@@ -273,6 +273,11 @@ class DirectCondensation:
         self._comm.Bcast(out)
         return 0.5 * (out + out.T)
 
+    @property
+    def recovers(self) -> bool:
+        """Whether displacements take no factorisation beside those that there are already."""
+        return self._factor is not None or self._inner is not None
+
     def displacement(self, last: Array) -> PETSc.Vec:
         """Displacements for given last coordinates; collective, one back-solve.
 

@@ -82,6 +82,11 @@ class IterativeCondensation:
         self.borders_on_retained = space.on_retained(whole.n_borders)[retained]
         timings.add("columns", start)
 
+    @property
+    def recovers(self) -> bool:
+        """Whether displacements take no factorisation: never one here."""
+        return True
+
     def displacement(self, last: Array) -> PETSc.Vec:
         """Displacements for given last coordinates; collective, one solve.
 

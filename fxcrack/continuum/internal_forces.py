@@ -22,7 +22,8 @@ from dolfinx import fem
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.halo import Halo
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kernels import fast_form
@@ -50,29 +51,72 @@ class OperatorChoice:
     seconds: dict[str, float]
 
 
-def local_matrix(continuum: Continuum, matrix: PETSc.Mat) -> sp.csr_matrix:
-    """Rows of the owned dofs of a matrix, columns in local numbers, ghosts last.
+class FurtherNodes:
+    """Nodes whose values rows of the stiffness need though they are no ghosts of this rank.
+
+    A row is complete with the contributions of all ranks. Where three ranks meet in a node, a cell
+    of the second may connect a node of the first with one of the third, which the first shares no
+    cell with.
+
+    Args:
+        continuum: Displacement space.
+        columns: Global columns of the rows of this rank, shape (n,).
+    """
+
+    def __init__(self, continuum: Continuum, columns: Ints) -> None:
+        index_map, comm = continuum.space.dofmap.index_map, continuum.comm
+        self._unknowns, self._n_owned = continuum.layout.n_unknowns, int(index_map.size_local)
+        sizes = comm.allgather(self._n_owned)
+        ranges = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+        nodes = np.unique(columns // self._unknowns)
+        first, end = ranges[comm.rank], ranges[comm.rank + 1]
+        outside = nodes[(nodes < first) | (nodes >= end)]
+        self.nodes = np.setdiff1d(outside, np.asarray(index_map.ghosts, dtype=np.int64))
+        self.exist = any(comm.allgather(len(self.nodes) > 0))
+        self._halo = Halo(comm, ranges, self.nodes)
+
+    def values(self, x: Array) -> Array:
+        """A local array and the values of these nodes behind it; collective.
+
+        Args:
+            x: Shape (n_local + number of ghost dofs,).
+
+        Returns:
+            The array itself where no rank needs more.
+        """
+        if not self.exist:
+            return x
+        owned = x[: self._n_owned * self._unknowns].reshape(-1, self._unknowns)
+        return np.concatenate([x, self._halo.fetch(owned).ravel()])
+
+
+def local_matrix(continuum: Continuum, matrix: PETSc.Mat) -> tuple[sp.csr_matrix, FurtherNodes]:
+    """Rows of the owned dofs of a matrix, columns in local numbers: owned, ghosts, further nodes.
+
+    Collective.
 
     Args:
         continuum: Displacement space.
         matrix: Matrix on it, assembled.
 
     Returns:
-        Shape (n_local, n_local + number of ghost dofs).
+        Shape (n_local, n_local + number of ghost and further dofs); the further nodes.
     """
     index_map, n = continuum.space.dofmap.index_map, continuum.layout.n_unknowns
     indptr, columns, values = matrix.getValuesCSR()
-    local = columns.astype(np.int64) - continuum.offset
+    columns = columns.astype(np.int64)
+    further = FurtherNodes(continuum, columns)
+    local = columns - continuum.offset
     outside = np.flatnonzero((local < 0) | (local >= continuum.n_local))
-    ghosts = np.asarray(index_map.ghosts, dtype=np.int64)
+    ghosts = np.concatenate([np.asarray(index_map.ghosts, dtype=np.int64), further.nodes])
     order = np.argsort(ghosts)
-    nodes, unknown = np.divmod(columns[outside].astype(np.int64), n)
+    nodes, unknown = np.divmod(columns[outside], n)
     place = order[np.searchsorted(ghosts[order], nodes)] if len(outside) else nodes
     local[outside] = n * (index_map.size_local + place) + unknown
-    width = n * (index_map.size_local + index_map.num_ghosts)
+    width = n * (index_map.size_local + len(ghosts))
     out = sp.csr_matrix((values, local.astype(np.int32), indptr), shape=(continuum.n_local, width))
     out.sort_indices()
-    return out
+    return out, further
 
 
 class InternalForces:
@@ -109,6 +153,7 @@ class InternalForces:
         self._form: Any = None
         self._energies: dict[str, Any] = {}
         self._matrix: sp.csr_matrix | None = None
+        self._further: FurtherNodes | None = None
         self._vector = fem.Function(continuum.space)
         self._evaluate: Callable[[], Array] = self._assembled
 
@@ -155,19 +200,29 @@ class InternalForces:
             self._matrix = None
 
     def stiffness(self) -> sp.csr_matrix:
-        """Linear elastic stiffness at zero strain, of the owned rows; collective."""
+        """Linear elastic stiffness at zero strain, of the owned rows; collective.
+
+        Its columns are those of :meth:`columns`.
+        """
         if self._matrix is None:
             matrix = self.continuum.stiffness()
-            self._matrix = local_matrix(self.continuum, matrix)
+            self._matrix, self._further = local_matrix(self.continuum, matrix)
             matrix.destroy()
         return self._matrix
+
+    def columns(self) -> Array:
+        """Displacements that the columns of :meth:`stiffness` belong to; collective.
+
+        The array of :attr:`u` itself, ghosts included, unless rows of some rank need more nodes.
+        """
+        return self.u.x.array if self._further is None else self._further.values(self.u.x.array)
 
     def forget_stiffness(self) -> None:
         """Free the memory of :meth:`stiffness`, which is assembled again where it is needed."""
         self._matrix = None
 
     def _product(self) -> Array:
-        return np.asarray(self.stiffness() @ self.u.x.array)
+        return np.asarray(self.stiffness() @ self.columns())
 
     def _compile(self) -> None:
         if self._form is None:
@@ -311,4 +366,4 @@ def _has_state(term: Term) -> bool:
     return bool(term.state())
 
 
-__all__ = ["InternalForces", "OperatorChoice", "local_matrix"]
+__all__ = ["FurtherNodes", "InternalForces", "OperatorChoice", "local_matrix"]

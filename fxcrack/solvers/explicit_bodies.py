@@ -69,6 +69,7 @@ class BodyMotion:
             if h != self._h:
                 self._change.data *= h / self._h
                 self._h = h
+            self._u = self._bodies.columns()
             self._rows.into(self._u, out)
             return
         forces = self._bodies.forces()

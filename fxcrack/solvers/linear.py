@@ -291,6 +291,11 @@ class LinearSolver(InterfaceSolver):
         factors, answers = state.loads[-self._n_thermal :], state.conjugate[-self._n_thermal :]
         return float(0.5 * factors @ self._held_energies @ factors - factors @ answers)
 
+    @property
+    def recovers_displacement(self) -> bool:
+        """Whether :meth:`displacement` takes a back-substitution and no new factorisation."""
+        return self.condensation is not None and self.condensation.recovers
+
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Displacement vector of a state; collective; the caller destroys it."""
         state = self.state if state is None else state
