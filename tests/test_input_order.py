@@ -57,3 +57,15 @@ def test_one_rank_and_all_ranks_write_and_read_the_same(
         assert (
             np.abs(all_.order.scatter(alone, place_b).ravel() - b.ravel()).max(initial=0.0) < 1e-14
         )
+
+
+@pytest.mark.three
+def test_values_of_ghosts_do_not_count(comm: MPI.Intracomm) -> None:
+    """Terms need not keep ghosts up to date: what a node holds is said by its owner."""
+    body = Body(comm, "solid", False, 1)
+    (positions, space), _ = body.fields()
+    right = body.order.gather(positions, space)
+    stale = positions.copy()
+    stale[space.dofmap.index_map.size_local :] = 1e3
+    found = body.order.gather(stale, space)
+    assert np.array_equal(found, right)

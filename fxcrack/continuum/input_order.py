@@ -40,9 +40,14 @@ class FileOrder:
 
         Args:
             values: Those of this rank, in the order of ``place``, node by node or cell by cell.
+                Of a node only the value of its owner counts.
             place: Where they are defined.
         """
         rows = self._rows_of(place)
+        if not isinstance(place, np.ndarray) and len(rows):
+            owned = int(place.dofmap.index_map.size_local)
+            values = values.reshape(len(rows), -1)[:owned]
+            rows = rows[:owned]
         parts = [p for p in self._comm.gather((rows, values)) or [] if len(p[0])]
         if not parts:
             return np.zeros((0, 0))

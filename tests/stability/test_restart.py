@@ -361,8 +361,6 @@ def test_restart_on_another_number_of_ranks(
 ) -> None:
     if comm.size == 1:
         pytest.skip("there is no other number of ranks")
-    if comm.size > 2 and name == "inertia, finite strain":
-        pytest.xfail("finite strain in motion is not resumed exactly on 3 ranks (docs/limits.md)")
     whole = run(name, comm)
     stop = round(0.5 * len(whole))
     # one rank, then all of them
