@@ -15,7 +15,7 @@ from fxcrack.continuum.continuum import Continuum
 
 @dataclass(frozen=True, eq=False)
 class CellGradients:
-    """Gradients in the cells that this rank owns.
+    """Gradients in the cells that this rank owns, or in some of them.
 
     Attributes:
         gradient: du_i/dx_j at the middle of each cell, shape (n_cells, gdim, gdim).
@@ -29,21 +29,22 @@ class CellGradients:
     nodes: Ints
 
     @classmethod
-    def of(cls, continuum: Continuum, displacement: Array) -> CellGradients:
+    def of(cls, continuum: Continuum, displacement: Array, *, every: int = 1) -> CellGradients:
         """Those of a displacement; collective.
 
         Args:
             continuum: Solid bodies.
             displacement: Of the dofs that this rank owns, shape (n_local,), length.
+            every: Distance of the cells that are looked at in their numbering; 1 takes all.
         """
         domain, gdim = continuum.mesh.domain, continuum.gdim
         u = fem.Function(continuum.space)
         u.x.array[: len(displacement)] = displacement
         u.x.scatter_forward()
         n = int(domain.topology.index_map(continuum.mesh.tdim).size_local)
-        nodes = np.asarray(continuum.space.dofmap.list)[:n].astype(np.int64)
+        nodes = np.asarray(continuum.space.dofmap.list)[:n:every].astype(np.int64)
         values = u.x.array.reshape(-1, gdim)[nodes]
-        x = domain.geometry.x[compat.geometry_dofmap(domain)[:n]][:, :, :gdim]
+        x = domain.geometry.x[compat.geometry_dofmap(domain)[:n:every]][:, :, :gdim]
         cell = getattr(basix.CellType, domain.topology.cell_name())
         middle = basix.geometry(cell).mean(axis=0)[None]
         jacobian = np.einsum("cni,jn->cij", x, _shapes(cell, continuum.mesh.order, middle))
