@@ -14,7 +14,7 @@ from fxcrack.condensation.free_bodies import FreeBodies
 from fxcrack.condensation.iterative import Roles
 from fxcrack.equilibrium.contact import ContactSystem
 from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.interface_solver import Condensed
 from fxcrack.solvers.newton_state import ResumedTangent

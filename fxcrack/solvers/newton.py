@@ -19,7 +19,7 @@ from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.condensed_tangent import CondensedRequest, condense_tangent
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy, pulling

@@ -16,7 +16,7 @@ from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import ContactSystem
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import JumpCoordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces
 from fxcrack.solvers.tangent import CondensedTangent
 
