@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fxcrack.base.checks import keep, list_of, not_negative, number, one_of, positive, shown
+from fxcrack.base.checks import keep, list_of, not_negative, number, one_of, positive, shown, whole
 from fxcrack.base.errors import InputError
 from fxcrack.solvers.options import ExplicitOptions
 from fxcrack.steps.end_conditions import Time, Until, conditions
@@ -77,8 +77,7 @@ class Explicit:
             positive("Explicit", dt=self.dt)
         if not 0.0 < number("Explicit", "safety", self.safety) <= 1.0:
             raise InputError(f"Explicit: safety = {self.safety} must lie between 0 and 1")
-        if not (isinstance(self.rows, int) and self.rows >= 1):
-            raise InputError(f"Explicit: rows = {self.rows!r} must be a whole number, at least 1")
+        keep(self, rows=whole("Explicit", "rows", self.rows))
         one_of("Explicit", "contact", self.contact, CONTACTS)
         one_of("Explicit", "operator", self.operator, OPERATORS)
         positive("Explicit", penalty=self.penalty, tolerance=self.tolerance)
