@@ -64,12 +64,12 @@ class SolverWork:
         solver = self._analysis.solver
         counts: Counter[str] = Counter(factorisations=solver.timings.factorizations)
         seconds: Counter[str] = Counter()
-        seconds.update(solver.timings.seconds)  # type: ignore[arg-type]  # of float
+        seconds.update(solver.timings.seconds)
         if isinstance(solver, ExplicitSolver):
             counts += Counter(increments=solver.increments, forces=solver.bodies.evaluations)
             return counts, seconds
         counts += Counter(contact=self._analysis.condensed.system.contact_steps)
-        counts += Counter(bonds=solver.soft_counts.solves)
+        counts += Counter(bonds=self._analysis.condensed.soft_counts.solves)
         if isinstance(solver, NewtonSolver):
             made = solver.counts
             counts += Counter(
