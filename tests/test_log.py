@@ -51,9 +51,8 @@ def test_the_part_of_a_step_that_is_done(step: Any, last: Row, part: float | Non
 
 @pytest.fixture
 def alone(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Loggers that nobody has configured, not even pytest."""
-    monkeypatch.setattr(log.logger, "propagate", False)
-    monkeypatch.setattr(log.logger, "handlers", [])
+    """As where nobody has configured logging; pytest has handlers at every logger."""
+    monkeypatch.setattr(log.progress, "hasHandlers", lambda: False)
     level = log.progress.level
     log.progress.setLevel(logging.NOTSET)
     yield
@@ -105,6 +104,7 @@ def test_progress_follows_the_levels_of_the_log(
     log.progress.setLevel(logging.NOTSET)
     handler = logging.StreamHandler(io.StringIO())
     monkeypatch.setattr(log.logger, "handlers", [handler])
+    monkeypatch.setattr(log.progress, "hasHandlers", lambda: True)
     lines_of(step, GROWTH)  # a program that wants warnings only
     assert not handler.stream.getvalue()
     log.progress.setLevel(logging.INFO)
