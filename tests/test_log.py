@@ -152,7 +152,7 @@ def test_levels_by_name() -> None:
 @pytest.mark.parametrize("finite", [False, True])
 def test_debug_says_what_the_solvers_did(caplog: pytest.LogCaptureFixture, finite: bool) -> None:
     caplog.set_level(logging.DEBUG, logger="fxcrack")
-    scene = dcb(MPI.COMM_WORLD, dx=1.0, ny=2)
+    scene = dcb(MPI.COMM_WORLD, dx=2.0, ny=1)
     if finite:
         scene = scene.rebuilt(effects=[fx.FiniteStrain()])
     history = scene.run(fx.Static(until=fx.Releases(1)))
