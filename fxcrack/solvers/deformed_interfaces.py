@@ -15,7 +15,7 @@ from fxcrack.interface.finite_sliding import CHANGING, changing, renewed, with_c
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 from fxcrack.interface.nodes import JumpGather
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.surface import gather_surface
 from fxcrack.solvers.increment_work import IncrementWork
 
@@ -103,7 +103,7 @@ class DeformedInterfaces:
         """What renewed pairings have changed, per pair; the same on any number of ranks.
 
         Returns:
-            Arrays by name, those of :class:`~fxcrack.interface.pairing.Pair` and of their shapes:
+            Arrays by name, those of :class:`~fxcrack.interface.pair.Pair` and of their shapes:
             paired and gap, shape (n_nodes,), masters (nodes of the master surface) and weights,
             shape (n_nodes, k), frames, shape (n_nodes, gdim, gdim).
         """

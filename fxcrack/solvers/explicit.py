@@ -40,7 +40,7 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import global_vectors
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_accounts import EnergyAccounts
 from fxcrack.solvers.explicit_bodies import BodyMotion

@@ -8,7 +8,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.internal_forces import InternalForces
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_energies import MotionEnergies, stored_energies, sums_over_ranks
 from fxcrack.solvers.explicit_interface import InterfaceDynamics

@@ -27,7 +27,7 @@ from fxcrack.base.sparse import Product
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.front import Front
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.explicit_acting import ActingForces, InterfaceEnergies
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
 from fxcrack.solvers.explicit_elastic import ElasticBonds

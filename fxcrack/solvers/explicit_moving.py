@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 from fxcrack.base.arrays import Ints
 from fxcrack.interface.front import Front
-from fxcrack.interface.pairing import Pair, local_frames
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import local_frames
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.explicit_acting import ActingForces
 from fxcrack.solvers.explicit_bonds import Fading
 from fxcrack.solvers.explicit_faces import (

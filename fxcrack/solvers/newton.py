@@ -22,7 +22,7 @@ from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
 from fxcrack.solvers.free_motion import moves_freely

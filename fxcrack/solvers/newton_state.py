@@ -14,7 +14,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.equilibrium.contact import ContactSystem
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import JumpCoordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.tangent import CondensedTangent
 
 
