@@ -168,6 +168,7 @@ OF_A_SCENE: list[tuple[Callable[..., Any], dict[str, Any]]] = [
     (fx.write_fields, {"source": SCENE, "path": "f.pvd", "time": 1.0}),
     (fx.write_releases, {"source": SCENE, "path": "r.csv"}),
     (fx.write_tip_table, {"source": SCENE, "path": "t.csv"}),
+    (fx.show_log, {"level": "warning"}),
     (identify.curve_of, {"history": HISTORY, "axes": identify.Axes("u", "R")}),
     (
         identify.linear_response,
