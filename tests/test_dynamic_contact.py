@@ -69,6 +69,7 @@ def test_contact_adds_no_energy_to_arms_left_alone(
         assert column(history, "friction_energy")[-1] > 0.0
 
 
+@pytest.mark.slow
 def test_conservation_holds_with_damping_as_the_increment_goes_to_zero(
     comm: MPI.Intracomm,
 ) -> None:
@@ -343,6 +344,7 @@ def test_a_sliding_block_is_stopped_by_friction(comm: MPI.Intracomm) -> None:
 # -- restart ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_run_that_was_interrupted_in_contact_goes_on_as_it_would_have(
     comm: MPI.Intracomm, tmp_path: Path
 ) -> None:
