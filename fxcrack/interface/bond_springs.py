@@ -30,7 +30,7 @@ from fxcrack.continuum.face import Face
 from fxcrack.continuum.face_compliance import face_compliance
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import InterfaceState
 from fxcrack.interface.bond_springs import bond_springs
 from fxcrack.interface.jump_coordinates import build_coordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
 
@@ -188,7 +188,7 @@ class LinearSolver(InterfaceSolver):
         spent = self.continuum.comm.bcast((made.column_seconds, time.perf_counter() - start))
         assert isinstance(self._cost, ColumnCost)
         self._cost.observe(made.computed, *spent)
-        log.info("%d new columns in %.2f s", made.computed, made.column_seconds)
+        log.debug("%d new columns in %.2f s", made.computed, made.column_seconds)
         return made
 
     # -- from equilibrium to equilibrium -------------------------------------------------
