@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import keep, numbers, text
+from fxcrack.base.checks import keep, numbers, shown
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.materials import Material
@@ -58,7 +58,11 @@ class ContinuumShell:
         """Check the arguments."""
         laminate = self.laminate
         for name in ("bottom", "top"):
-            text("ContinuumShell", name, getattr(self, name))
+            given = getattr(self, name)
+            if not isinstance(given, str):
+                raise InputError(
+                    f"ContinuumShell: {name} = {shown(given)} must be the name of a group of faces"
+                )
         if self.bottom == self.top:
             raise InputError(
                 f"ContinuumShell: bottom and top are both '{self.bottom}'; name the faces on "
