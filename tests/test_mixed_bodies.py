@@ -80,7 +80,7 @@ def solids(comm: MPI.Intracomm) -> tuple[float, float]:
 
 @pytest.mark.mpi
 @pytest.mark.three
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_shells_bonded_to_solids(comm: MPI.Intracomm, order: int) -> None:
     """Shells above and solids below, and the mirror image: the same G; of second order that of
     solids of four cells an arm. The end of the lower arm is held, which the load sees.

@@ -159,7 +159,7 @@ def test_a_face_of_several_sections(comm: MPI.Intracomm) -> None:
         plain.rebuilt(materials={"near": near, "far": fx.Section(UD, thickness=2.0), "lower": low})
 
 
-@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("offset", [0.75, -0.3])
 def test_meshes_off_the_middle(comm: MPI.Intracomm, order: int, offset: float) -> None:
     """Load and rate do not depend on where the mesh of an arm lies, from face to face.
