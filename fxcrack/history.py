@@ -97,6 +97,14 @@ class History:
         """Communicator; rank 0 writes files."""
         return self._comm
 
+    def __repr__(self) -> str:
+        """Number of rows and columns, and why the last step ended."""
+        return f"<History of {len(self)} rows and {len(self.columns)} columns: {self.reason}>"
+
+    def __str__(self) -> str:
+        """What happened, see :meth:`describe`."""
+        return self.describe()
+
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.rows)
