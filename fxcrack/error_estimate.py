@@ -170,8 +170,8 @@ class Estimate:
                 out[-1] = f"order=2 {mesh_of}, or in first order {out[-1]}"
             elif self.jumps is not None:
                 out[-1] += (
-                    " (keep order=2, in first order they would have to be far smaller; the jumps of "
-                    "the strain are a bound, so halve the elements once and compare)"
+                    " (keep order=2, in first order they would have to be far smaller; the jumps "
+                    "of the strain are a bound, so halve the elements once and compare)"
                 )
             elif self.domain is not None:
                 out[-1] += " (keep order=2, in first order they would have to be far smaller)"
