@@ -239,7 +239,8 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
     # of an unknown power the smallest is assumed: it makes the error of the load the largest
     degree = min((d.criterion.degree or 1.0 for d in grow), default=1.0)
     rates = all(d.criterion.knows_toughness for d in grow)
-    domain = jumps = None
+    domain: float | None = None
+    jumps: float | None = None
     if order == 2 and not isinstance(step, Cycles):
         domain, jumps, size = _beside_domain_integral(scene, step, grow, name)
         if domain is not None and jumps is not None:
@@ -317,7 +318,7 @@ def _beside_domain_integral(
     analysis = scene.analysis
     if not all(isinstance(d.criterion, RateCriterion) for d in grow):
         return None, None, 0.0
-    jumps = None
+    jumps: float | None = None
     columns = [f"G{mode}{{}}[{name}]" for mode in ("I", "II", "III")]
     watched: dict[Debond, Debond] = {}
     try:
@@ -327,8 +328,8 @@ def _beside_domain_integral(
                 # at the first onset nothing is released yet
                 decides = cast(RateCriterion, d.criterion).method
                 other: Method = "vcct" if decides == "domain" else "domain"
-                beside = VCCT(GIc=1.0, method=other)
-                watched[d] = replace(d, release=StepRelease(), watch=[beside])
+                another = VCCT(GIc=1.0, method=other)
+                watched[d] = replace(d, release=StepRelease(), watch=[another])
         twin = scene.rebuilt(debonds=list(watched.values()))
         try:
             short = _to_onset(step, linear=analysis.linear)
