@@ -63,7 +63,7 @@ from fxcrack.deck.deck import Deck, read_deck
 from fxcrack.deck.write import write_deck
 from fxcrack.effects import FiniteStrain
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.front_line import FrontLine, front_lines

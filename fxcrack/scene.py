@@ -27,7 +27,8 @@ from fxcrack.continuum.section import Section
 from fxcrack.effects import form_terms
 from fxcrack.error_estimate import as_details, check_accuracy, demand
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.mesh import Mesh
 from fxcrack.output.explain import Explanation, explain

@@ -14,7 +14,8 @@ import fxcrack as fx
 from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.jump_coordinates import RETAINED, JumpCoordinates, build_coordinates
-from fxcrack.interface.pairing import Pair, make_pair
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import make_pair
 from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build

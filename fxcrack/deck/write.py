@@ -52,7 +52,8 @@ from fxcrack.deck.write_mesh import MeshLines
 from fxcrack.deck.write_properties import criterion_lines, material_lines
 from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import AnySupport
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles

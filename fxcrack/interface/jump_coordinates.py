@@ -73,7 +73,7 @@ from fxcrack.interface.following import Following
 from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 FIXED, FREE, RETAINED = 0, 1, 2

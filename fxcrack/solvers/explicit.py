@@ -40,7 +40,8 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import global_vectors
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair, local_frames
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import local_frames
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_elastic import ElasticBonds

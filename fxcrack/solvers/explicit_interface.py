@@ -26,7 +26,7 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
 from fxcrack.solvers.explicit_elastic import ElasticBonds
 from fxcrack.solvers.explicit_faces import (

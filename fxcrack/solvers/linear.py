@@ -31,7 +31,7 @@ from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, w
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import InterfaceState
 from fxcrack.interface.jump_coordinates import build_coordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
 

@@ -13,7 +13,7 @@ from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.criteria import VCCT
 from fxcrack.interface.crack_pressure import CrackPressure
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit_release import law_of
 
