@@ -49,8 +49,11 @@ class RateCriterion(Criterion):
             :func:`~fxcrack.criteria.crack_closure.energy_release_rates`.
         rings: Outer radius of the ring of method="domain", in lengths of the cells at the tip. It
             is less where the cells on one side are of several materials.
-        reference_length: Length to which the modes belong where the two sides are of different
-            materials [length]; see :mod:`~fxcrack.criteria.crack_tip_fields`.
+        reference_length: Length to which the modes of method="domain" belong where the two sides
+            are of different materials [length]; see :mod:`~fxcrack.criteria.crack_tip_fields`.
+        mode_length: Length of crack closure to which the modes of the other methods belong there
+            [length]; ``None``: the length of the elements, so that they change with the mesh. See
+            :mod:`~fxcrack.criteria.mode_length`.
     """
 
     GIc: Property
@@ -62,6 +65,7 @@ class RateCriterion(Criterion):
     normalisation: Normalisation = field(default="equal_length", kw_only=True)
     rings: int = field(default=RINGS, kw_only=True)
     reference_length: float | None = field(default=None, kw_only=True)
+    mode_length: float | None = field(default=None, kw_only=True)
 
     knows_toughness: ClassVar[bool] = True
     release_drivers: ClassVar[frozenset[Driver]] = frozenset(("once", "increments", "opening"))
@@ -82,6 +86,13 @@ class RateCriterion(Criterion):
             raise InputError(f"{self._owner}: rings = {self.rings}: give 1 or more, e.g. 3")
         if self.reference_length is not None:
             positive(self._owner, reference_length=self.reference_length)
+        if self.mode_length is not None:
+            positive(self._owner, mode_length=self.mode_length)
+            if self.method == "domain":
+                raise InputError(
+                    f"{self._owner}: mode_length = {self.mode_length:g} is a length of crack "
+                    "closure; the modes of method='domain' belong to reference_length"
+                )
         if self.mix is not None:
             object.__setattr__(self, "mix", law_of(self._owner, self.mix))
         if self.mix is None and not (self.GIIc is None and self.GIIIc is None):

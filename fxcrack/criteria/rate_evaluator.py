@@ -19,6 +19,7 @@ from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
 from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.criteria.mixed_mode import total
+from fxcrack.criteria.mode_length import ModesAtLength, closure_lengths
 from fxcrack.criteria.probe import (
     FrontProbe,
     State,
@@ -69,6 +70,9 @@ class RateEvaluator(SofteningEvaluator):
         self._domain: DomainIntegral | None = None
         if criterion.method == "domain":
             self._domain = DomainIntegral(probe, criterion.rings, criterion.reference_length)
+        self._modes: ModesAtLength | None = None
+        if criterion.mode_length is not None:
+            self._modes = ModesAtLength(probe, criterion.mode_length)
         hierarchy = probe.pair.hierarchy
         self._largest_unit = 0 if hierarchy is None else 1 + hierarchy.most_beside()
         surface = probe.pair.surface
@@ -173,16 +177,27 @@ class RateEvaluator(SofteningEvaluator):
         """Rates by crack closure, shape (n, 3), force/length."""
         if self.criterion.method == "closure":
             signed = 1 if self._closes_units else None
-            return closure_rates(force, opening, tips.area, signed=signed)
+            weights = np.repeat(0.5 / tips.area[:, None], force.shape[1], axis=1)
+            plain = closure_rates(force, opening, tips.area, signed=signed)
+        else:
+            weights = self._closure_weights(tips, force.shape[1])
+            plain = weighted_rates(force, opening, weights)
+        if self._modes is None:
+            return plain
+        lengths = closure_lengths(tips, force.shape[1], self.criterion.method)
+        return self._modes.split(tips, force, opening, weights, plain, lengths)
+
+    def _closure_weights(self, tips: Tips, n_products: int) -> Array:
+        """What multiplies the products of force and opening, shape (n, k) [1/length^2]."""
         if tips is not self._weighed:
             lengths = (tips.d_ahead, tips.d_behind, tips.width)
             self._weights = closure_weights(
-                *lengths, force.shape[1], self.criterion.normalisation, tips.straight
+                *lengths, n_products, self.criterion.normalisation, tips.straight
             )
             if self._largest_unit:
                 self._weights = self._weights / CLOSURE_BY_CORNERS
             self._weighed = tips
-        return weighted_rates(force, opening, self._weights)
+        return self._weights
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:
         """Values f and the energy release rates.
