@@ -373,7 +373,7 @@ def test_step_release_runs_through_tough_parts_and_progressive_release_does_not(
             debonds=[
                 fx.Debond(
                     interface,
-                    fx.VCCT(GIc=lambda x: np.where(x[:, 0] < 7.0 * HALF, G_IC, 2.0 * G_IC)),
+                    fx.VCCT(GIc=lambda x: np.where(x[0] < 7.0 * HALF, G_IC, 2.0 * G_IC)),
                     release=release,
                 )
             ],

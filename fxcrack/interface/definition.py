@@ -38,8 +38,9 @@ class Interface:
             Where the interface ends inside a body both sides share the nodes of that border, which
             stay bonded.
         bonded: The initially bonded slave nodes: the name of a group, a function of positions of
-            shape (3, n) that returns n booleans, an array of booleans per slave node (in the
-            order of ``Pair.surface``), or ``None``: all of them, and no tip exists.
+            shape (3, n) that returns n booleans (nodes on the border of its region are bonded,
+            ``>`` and ``>=`` mean the same), an array of booleans per slave node (in the order of
+            ``Pair.surface``), or ``None``: all of them, and no tip exists.
         contact: Open faces cannot pass through each other (unilateral).
         friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
             a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.

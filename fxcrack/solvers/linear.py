@@ -175,7 +175,7 @@ class LinearSolver(InterfaceSolver):
         spent = self.continuum.comm.bcast((made.column_seconds, time.perf_counter() - start))
         assert isinstance(self._cost, ColumnCost)
         self._cost.observe(made.computed, *spent)
-        log.info("%d new columns in %.2f s", made.computed, made.column_seconds)
+        log.debug("%d new columns in %.2f s", made.computed, made.column_seconds)
         return made
 
     # -- from equilibrium to equilibrium -------------------------------------------------
