@@ -156,7 +156,8 @@ class ModesAtLength:
         parts = [self._part(node, on[node]) for on in (self._above, self._below)]
         key = np.array(parts).tobytes() + np.round(frame, 9).tobytes()
         if key not in self._fields:
-            fields = TipFields(*(self._stiffness[p] for p in parts), frame, self._length)
+            above, below = (self._stiffness[p] for p in parts)
+            fields = TipFields(above, below, frame, self._length)
             axes = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
             self._fields[key] = fields.span @ axes, fields.oscillation
         return self._fields[key]
