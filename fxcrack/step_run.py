@@ -75,10 +75,12 @@ def check_step(
             )
         return
     for pair in analysis.pairs:
-        if pair.interface.stiffness is not None:
+        if pair.interface.stiffness is not None and not analysis.linear:
             raise InputError(
                 f"interface '{pair.interface.title}': bonds with a stiffness of their own are for "
-                f"Explicit; leave stiffness out in {type(step).__name__} steps, which hold exactly"
+                "linear bodies and for Explicit; leave stiffness out in "
+                f"{type(step).__name__} steps of nonlinear or moving bodies, whose bonds hold "
+                "exactly"
             )
     effects, why = analysis.effects, analysis.plan.why
     if isinstance(analysis.solver, ExplicitSolver):
