@@ -51,6 +51,7 @@ SHELLS = {
 }
 
 
+@pytest.mark.quick("equal")
 @pytest.mark.parametrize("case", ["equal", "thin above", "coupled", "notched"])
 def test_one_cell_per_arm(case: str) -> None:
     (upper, lower), options = CASES[case]
