@@ -155,7 +155,7 @@ CALLS: list[Call] = [
         {
             "GIc": 0.2, "GIIc": 0.5, "GIIIc": 0.5, "mix": fx.BK(eta=1.6), "tolerance": 0.2,
             "method": "vcct", "normalisation": "tributary", "unstable_tolerance": 0.3,
-            "viscosity": 0.0, "reference_length": None,
+            "viscosity": 0.0, "reference_length": None, "mode_length": None,
         },
     ),
     (fx.VCCT, {"GIc": 0.2, "method": "domain", "rings": 2}),
@@ -165,6 +165,7 @@ CALLS: list[Call] = [
             "GIc": 0.2, "GIIc": 0.5, "GIIIc": 0.5, "mix": fx.BK(eta=1.6), "tolerance": 0.2,
             "GIc_p": 0.3, "GIIc_p": 0.6, "GIIIc_p": 0.6, "method": "vcct", "viscosity": 0.0,
             "normalisation": "tributary", "unstable_tolerance": 0.3, "reference_length": None,
+            "mode_length": None,
         },
     ),
     (fx.EnhancedVCCT, {"GIc": 0.2, "GIc_p": 0.3, "method": "domain", "rings": 2}),
@@ -184,7 +185,7 @@ CALLS: list[Call] = [
         {
             "GIc": 0.2, "GIIc": 0.5, "GIIIc": 0.5, "mix": fx.BK(eta=1.6), "tolerance": 0.2,
             "growth": fx.ParisK(1.0, 2.0, 7e4, 0.3), "method": "vcct", "rings": 3,
-            "normalisation": "tributary", "reference_length": None,
+            "normalisation": "tributary", "reference_length": None, "mode_length": None,
         },
     ),
     (
