@@ -9,6 +9,7 @@ from typing import Any, cast
 from mpi4py import MPI
 
 from fxcrack.base import log
+from fxcrack.base.checks import communicator, file_path
 from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.deck.cards import DeckError
 from fxcrack.deck.explicit import SAFETY
@@ -126,17 +127,19 @@ def read_deck(
         DeckError: The deck cannot be read, or asks for what fxcrack does not have.
         InputError: The scene it describes contradicts itself.
     """
-    found = on_root(comm, lambda: translated(Path(path), order), DeckError)
+    path = file_path("read_deck", "path", path)
+    communicator("read_deck", comm)
+    found = on_root(comm, lambda: translated(path, order), DeckError)
     raw = None if found is None else found.raw
     shared: tuple[dict[str, Any], list[DeckStep], Report, dict[str, NodeNames]] = comm.bcast(
         None if found is None else (found.arguments, found.steps, found.report, found.nodes)
     )
     arguments, steps, report, nodes = shared
-    mesh = distribute(raw, comm, Path(path).stem)
+    mesh = distribute(raw, comm, path.stem)
     try:
         scene = Scene(mesh, **arguments)
     except InputError as error:
-        raise DeckError(f"{Path(path).name}: {error}") from error
+        raise DeckError(f"{path.name}: {error}") from error
     finally:  # after the scene is made, whose report holds the warnings since then
         for line in report.replaced:
             log.warn("%s", line)
