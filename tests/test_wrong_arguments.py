@@ -73,7 +73,7 @@ def public() -> dict[str, Any]:
 def test_nothing_public_and_no_argument_is_left_out() -> None:
     """A new class, function or argument comes with a sound call here, or with a reason."""
     tried: dict[Any, set[str]] = {}
-    for call, given in CALLS:
+    for call, given in [*CALLS, *OF_A_SCENE]:
         tried.setdefault(call, set()).update(given)
     tried[fx.Scene] = {"mesh", *PARTS}
     missing = {}
@@ -146,4 +146,70 @@ def test_wrong_arguments_of_scenes_and_runs(
             problem = trouble(run_scene, {"mesh": mesh, name: wrong})
             if problem:
                 found.append(f"{name}={described(wrong)}: {problem}")
+    assert found == []
+
+
+# -- functions of a scene and of files -------------------------------------------------------------
+
+SCENE = object()
+"""Stands for a scene that has run."""
+HISTORY = object()
+"""Stands for its history."""
+OF_A_SCENE: list[tuple[Callable[..., Any], dict[str, Any]]] = [
+    (fx.BondHistory, {"source": SCENE, "interface": "bond", "where": lambda x: x[0] > 4.0}),
+    (fx.FieldSeries, {"source": SCENE, "path": "s.pvd", "events": ("start",), "every": 1}),
+    (fx.bond_table, {"source": SCENE}),
+    (fx.tip_table, {"source": SCENE}),
+    (fx.displacement_function, {"source": SCENE}),
+    (fx.front_lines, {"source": SCENE, "interface": "bond"}),
+    (fx.ply_results, {"source": SCENE, "group": None}),
+    (fx.with_usual_names, {"history": HISTORY}),
+    (fx.write_deck, {"scene": SCENE, "steps": [fx.Static(until=fx.Time(1.0))], "path": "d.inp"}),
+    (fx.write_fields, {"source": SCENE, "path": "f.pvd", "time": 1.0}),
+    (fx.write_releases, {"source": SCENE, "path": "r.csv"}),
+    (fx.write_tip_table, {"source": SCENE, "path": "t.csv"}),
+    (fx.show_log, {"level": "warning"}),
+    (identify.curve_of, {"history": HISTORY, "axes": identify.Axes("u", "R")}),
+    (
+        identify.linear_response,
+        {"scene": SCENE, "until": fx.CrackLength(BOND, 5.0), "axes": identify.Axes("u", "R")},
+    ),
+    (
+        identify.read_record,
+        {
+            "path": "record.csv", "opening": "opening", "load": "load", "crack_length": None,
+            "name": "n",
+        },
+    ),
+    (fx.read_deck, {"path": "none.inp", "comm": MPI.COMM_SELF, "order": 1}),
+    (fx.read_mesh, {"path": "none.msh", "comm": MPI.COMM_SELF, "gdim": 2, "split": ()}),
+    (
+        fx.mesh_from_gmsh,
+        {"model": "none", "comm": MPI.COMM_SELF, "gdim": 2, "split": (), "name": "n"},
+    ),
+    (
+        fx.from_dolfinx,
+        {"domain": "none", "cell_tags": None, "facet_tags": None, "names": None, "name": "n"},
+    ),
+]  # fmt: skip
+
+
+def test_wrong_arguments_of_functions_of_a_scene(
+    mesh: fx.Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("record.csv").write_text("opening,load\n1,2\n2,1.5\n3,1\n")
+    scene = fx.Scene(mesh, **PARTS)
+    history = scene.run(fx.Static(until=fx.Releases(1)), progress=False)
+    every = [(c, given, name, w) for c, given in OF_A_SCENE for name in given for w in WRONG]
+    found = []
+    for i in np.random.default_rng(13).permutation(len(every))[:400]:
+        call, given, name, wrong = every[i]
+        sound = {
+            k: scene if v is SCENE else history if v is HISTORY else v for k, v in given.items()
+        }
+        problem = trouble(call, sound | {name: wrong})
+        if problem:
+            found.append(f"{call.__qualname__}({name}={described(wrong)}): {problem}")
+    scene.close()
     assert found == []

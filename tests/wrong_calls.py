@@ -360,12 +360,6 @@ ELSEWHERE = {
         "a result, which the package makes",
     ),
     "identify.reduction": "a module",
-    **dict.fromkeys(
-        ("BondHistory", "FieldSeries", "bond_table", "displacement_function", "front_lines",
-         "from_dolfinx", "identify.curve_of", "identify.linear_response", "identify.read_record",
-         "mesh_from_gmsh", "ply_results", "read_deck", "read_mesh", "show_log", "tip_table",
-         "with_usual_names", "write_deck", "write_fields", "write_releases", "write_tip_table"),
-        "a function of a scene or of files, not tried here",
-    ),
 }  # fmt: skip
-"""Public names without a sound call here, and why."""
+"""Public names without a sound call here, and why; functions of scenes and files are tried with a
+scene."""
