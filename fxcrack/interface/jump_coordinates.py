@@ -45,7 +45,8 @@ Columns of T, in this order on each rank:
 * on rank 0 only, last: retained jumps, one column per prescribed displacement component
   (u = d times its shape), and empty columns for the borders of force patterns and monitors.
 
-A fixed jump has no column: it is zero.
+A fixed jump has no column: it is zero. Unknowns that all nodes share (the strain out of the plane
+of generalised plane strain) have one inner column together, with ones in the rows of their dofs.
 
 Dofs that follow others by couplings and equations (:mod:`fxcrack.interface.following`) have no
 column of their own but rows of T with the columns of what they follow. The jump of a slave node
@@ -199,6 +200,7 @@ def build_coordinates(
     for link, role in zip(links, roles, strict=True):
         follows[link.nodes, :gdim] = True
         free_jump[link.nodes, :gdim] = role[link.slaves] == FREE
+    _share(layout, supports, own)
     local = layout.dofs(nodes.local)
     follows_here = follows[nodes.mine]
     own[local[follows_here]] = free_jump[nodes.mine][follows_here]
@@ -220,6 +222,7 @@ def build_coordinates(
     n_columns = int(counts.sum()) + extra
     column = np.full(layout.n_local, -1, dtype=np.int64)
     column[own] = start + np.arange(n_inner)
+    _spread(layout, supports, column)
 
     composed: tuple[Ints, sp.csr_matrix] | None = None
     if following is not None:
@@ -253,6 +256,34 @@ def build_coordinates(
         transform, frames, held, index, n_retained, n_supports, n_borders, n_inner, first,
         np.flatnonzero(own),
     )  # fmt: skip
+
+
+def _free_shared(layout: DofLayout, supports: Supports) -> list[tuple[int, Ints]]:
+    """Shared unknowns that are not prescribed, with the owned dofs of each; collective."""
+    nodes = np.arange(layout.n_owned)
+    found = [(unknown, layout.dof(nodes, unknown)) for unknown in layout.shared]
+    held = [bool((supports.which[dofs] >= 0).any()) for _, dofs in found]
+    if not found:
+        return []
+    anywhere = np.any(layout.comm.allgather(held), axis=0)
+    return [one for one, is_held in zip(found, anywhere, strict=True) if not is_held]
+
+
+def _share(layout: DofLayout, supports: Supports, own: Bools) -> None:
+    """Leave one dof of each shared unknown a column of its own, in place; collective."""
+    for unknown, dofs in _free_shared(layout, supports):
+        own[dofs] = False
+        at = layout.shared_dof(unknown)
+        if at is not None:
+            own[at] = True
+
+
+def _spread(layout: DofLayout, supports: Supports, column: Ints) -> None:
+    """Give the dofs of each shared unknown the column of that one, in place; collective."""
+    for unknown, dofs in _free_shared(layout, supports):
+        at = layout.shared_dof(unknown)
+        mine = -1 if at is None else int(column[at])
+        column[dofs] = layout.comm.bcast(mine, root=layout.shared_owner)
 
 
 @dataclass(frozen=True)

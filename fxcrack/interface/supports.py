@@ -17,6 +17,7 @@ from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint, Coupling, Equation
 from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.continuum.generalised_plane_strain import SharedUnknown, shared_unknowns
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry, rotation_values
 from fxcrack.continuum.shell_bodies import ShellBodies
@@ -42,7 +43,7 @@ class SupportColumn:
     """
 
     title: str
-    support: AnySupport
+    support: AnySupport | SharedUnknown
     moves: bool
     scale: float
     largest: float = 0.0
@@ -199,6 +200,14 @@ def collect_supports(continuum: Continuum, supports: Sequence[AnySupport]) -> Su
             largest = max(abs(low), abs(high))
             columns.append(SupportColumn(f"{support.title}.{axis}", support, moves, scale, largest))
     raise_on_all_ranks(continuum.comm, problem)
+    for shared in shared_unknowns(continuum.model):
+        if shared.prescribed is not None:
+            dofs = layout.dof(np.arange(layout.n_owned), shared.unknown)
+            which[dofs], value[dofs] = len(columns), shared.prescribed / shared.per_unknown
+            moves = shared.prescribed != 0.0
+            size = abs(shared.prescribed / shared.per_unknown)
+            scale = shared.prescribed / shared.per_unknown if moves else 1.0
+            columns.append(SupportColumn(shared.title, shared, moves, scale, size))
     _share_at_joints(layout, which, value, columns)
     for i, column in enumerate(columns):
         # a component that stays zero keeps a column of ones, which gives its reaction

@@ -82,6 +82,11 @@ class LinearSolver(InterfaceSolver):
                 "CondensedOptions(method='iterative') is not possible with shells, whose stiffness "
                 "against bending and stretching differs too much; leave method out"
             )
+        if options.method == "iterative" and continuum.layout.shared:
+            raise InputError(
+                "CondensedOptions(method='iterative') is not possible in generalised plane strain, "
+                "whose strain out of the plane links all nodes; leave method out"
+            )
         if options.method == "iterative" or (options.method == "auto" and self._too_large()):
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(
@@ -92,7 +97,7 @@ class LinearSolver(InterfaceSolver):
 
     def _too_large(self) -> bool:
         """Whether a factorisation would not fit the memory, which is logged; collective."""
-        if self.continuum.gdim < 3 or isinstance(self.continuum, ShellBodies):
+        if self.continuum.mesh.gdim < 3 or isinstance(self.continuum, ShellBodies):
             return False
         comm = self.continuum.comm
         reason = too_large_for_direct(self.continuum.n_global, 1e6 * machine_memory_mb(comm))
