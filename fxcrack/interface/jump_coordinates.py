@@ -75,6 +75,7 @@ from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pairing import Pair
+from fxcrack.interface.shared_unknowns import SharedUnknowns
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 FIXED, FREE, RETAINED = 0, 1, 2
@@ -87,6 +88,8 @@ class JumpCoordinates:
 
     Attributes:
         transform: T, PETSc AIJ, shape (n_global, n_coordinates).
+        sparse: T without the columns of unknowns that all nodes share; T itself without them.
+        shared: Columns of these, shape (n_shared,).
         frames: Frame of each slave node per pair, aligned with supports, (n_nodes, gdim, gdim).
         held: Jump components that supports hold at zero, per pair, shape (n_nodes, gdim).
         index: Number among the retained jumps of each jump component per pair, -1 where it is not
@@ -101,6 +104,8 @@ class JumpCoordinates:
     """
 
     transform: PETSc.Mat
+    sparse: PETSc.Mat
+    shared: Ints
     frames: list[Array]
     held: list[Bools]
     index: list[Ints]
@@ -115,6 +120,12 @@ class JumpCoordinates:
     def n_last(self) -> int:
         """Retained, support and border columns together."""
         return self.n_retained + self.n_supports + self.n_borders
+
+    def destroy(self) -> None:
+        """Free the matrices; collective."""
+        self.transform.destroy()
+        if self.sparse is not self.transform:
+            self.sparse.destroy()
 
 
 def global_vectors(index: Ints, frames: Array, values: Array) -> Array:
@@ -200,7 +211,8 @@ def build_coordinates(
     for link, role in zip(links, roles, strict=True):
         follows[link.nodes, :gdim] = True
         free_jump[link.nodes, :gdim] = role[link.slaves] == FREE
-    _share(layout, supports, own)
+    shared = SharedUnknowns(layout, supports)
+    shared.keep_one(own)
     local = layout.dofs(nodes.local)
     follows_here = follows[nodes.mine]
     own[local[follows_here]] = free_jump[nodes.mine][follows_here]
@@ -222,7 +234,7 @@ def build_coordinates(
     n_columns = int(counts.sum()) + extra
     column = np.full(layout.n_local, -1, dtype=np.int64)
     column[own] = start + np.arange(n_inner)
-    _spread(layout, supports, column)
+    at_shared = shared.spread(column, first + n_retained)
 
     composed: tuple[Ints, sp.csr_matrix] | None = None
     if following is not None:
@@ -248,42 +260,18 @@ def build_coordinates(
         of_followers = sp.vstack(
             [of_followers, composed[1][following.mine(layout)[0]]], format="csr"
         )
-    transform = _assemble(
-        layout, supports, column, followers, of_followers, first + n_retained,
-        (n_inner + (extra if comm.rank == 0 else 0), n_columns),
-    )  # fmt: skip
+    single = (supports.which >= 0) | (column >= 0)
+    single[followers] = False
+    size = n_inner + (extra if comm.rank == 0 else 0), n_columns
+    given = layout, supports, column, followers, of_followers, first + n_retained, size
+    transform = _assemble(single, *given)
+    sparse = transform
+    if layout.shared:
+        sparse = _assemble(shared.without(single), *given)
     return JumpCoordinates(
-        transform, frames, held, index, n_retained, n_supports, n_borders, n_inner, first,
-        np.flatnonzero(own),
+        transform, sparse, at_shared, frames, held, index, n_retained, n_supports, n_borders,
+        n_inner, first, np.flatnonzero(own),
     )  # fmt: skip
-
-
-def _free_shared(layout: DofLayout, supports: Supports) -> list[tuple[int, Ints]]:
-    """Shared unknowns that are not prescribed, with the owned dofs of each; collective."""
-    nodes = np.arange(layout.n_owned)
-    found = [(unknown, layout.dof(nodes, unknown)) for unknown in layout.shared]
-    held = [bool((supports.which[dofs] >= 0).any()) for _, dofs in found]
-    if not found:
-        return []
-    anywhere = np.any(layout.comm.allgather(held), axis=0)
-    return [one for one, is_held in zip(found, anywhere, strict=True) if not is_held]
-
-
-def _share(layout: DofLayout, supports: Supports, own: Bools) -> None:
-    """Leave one dof of each shared unknown a column of its own, in place; collective."""
-    for unknown, dofs in _free_shared(layout, supports):
-        own[dofs] = False
-        at = layout.shared_dof(unknown)
-        if at is not None:
-            own[at] = True
-
-
-def _spread(layout: DofLayout, supports: Supports, column: Ints) -> None:
-    """Give the dofs of each shared unknown the column of that one, in place; collective."""
-    for unknown, dofs in _free_shared(layout, supports):
-        at = layout.shared_dof(unknown)
-        mine = -1 if at is None else int(column[at])
-        column[dofs] = layout.comm.bcast(mine, root=layout.shared_owner)
 
 
 @dataclass(frozen=True)
@@ -455,6 +443,7 @@ def _followed_unknowns(
 
 
 def _assemble(
+    single: Bools,
     layout: DofLayout,
     supports: Supports,
     column: Ints,
@@ -466,6 +455,8 @@ def _assemble(
     """T from the single-entry rows of ordinary dofs and the rows of dofs that follow others.
 
     Args:
+        single: Owned dofs that have a single entry, shape (n_local,); others that follow none have
+            an empty row.
         layout: Unknowns of nodes and their numbers.
         supports: Prescribed components.
         column: Column of each owned dof's own, -1 where it has none, shape (n_local,).
@@ -474,8 +465,6 @@ def _assemble(
         support_column: First column of the supports.
         size: Columns that this rank owns, and all columns.
     """
-    single = (supports.which >= 0) | (column >= 0)
-    single[followers] = False
     r = np.flatnonzero(single)
     held = supports.which[r] >= 0
     c = np.where(held, support_column + supports.which[r], column[r])
