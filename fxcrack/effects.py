@@ -17,6 +17,7 @@ from fxcrack.continuum.conserving import conserving
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
+from fxcrack.continuum.generalised_plane_strain import shared_unknowns
 from fxcrack.continuum.inertia import Inertia, InertiaForces
 from fxcrack.continuum.loads import Load, Pressure
 from fxcrack.continuum.neo_hookean import NeoHookeanBodies
@@ -28,7 +29,8 @@ from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.continuum.tied_elastic import TiedElastic
 from fxcrack.interface.crack_pressure import CrackPressure
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.plan import SOLVERS, Plan
 
@@ -152,6 +154,9 @@ def plan(
             "FiniteStrain() and NeoHookean, or use an elastic material"
         )
     _check_section(continuum, effects, loads, finite)
+    if continuum.layout.shared:
+        names = ", ".join(s.title for s in shared_unknowns(continuum.model))
+        on.append(f"generalised plane strain: {names} of the whole section")
     if finite:
         on.append("finite strain: large rotations and strains of the bodies")
         why.append("finite strain makes the bodies nonlinear")

@@ -98,6 +98,27 @@ def test_symmetric_laminates_in_tension_follow_laminate_theory(notation: str, or
     assert found == pytest.approx(STRAIN * soft[0, 1] / soft[0, 0], rel=EXACT)
 
 
+def test_a_smeared_laminate_stretches_as_its_membrane():
+    lay_up = laminate("[0/45/-45/90]s")
+    whole = fx.Laminate([fx.Ply(0.25, a, CFRP) for a in lay_up.angles], frame=("x", -90.0))
+    mesh = dcb_2d(MPI.COMM_SELF, length=LENGTH, dx=2.0, ny=1)
+    scene = fx.Scene(
+        mesh,
+        materials=whole,
+        model=FREE,
+        supports=[
+            *(fx.Displacement(k, x=0.01 if "far" in k else 0.0, z=0.0) for k in ENDS),
+            fx.Displacement("pin_bottom", y=0.0),
+        ],
+        bonds=[fx.Interface("upper_face", "lower_face", name="bond")],
+    )
+    row = scene.run(fx.Static(until=fx.Time(1.0)), grow=[], progress=False).rows[-1]
+    soft = np.linalg.inv(lay_up.abd()[:3, :3]) * lay_up.thickness
+    stress = sum(row[f"R[{k}.x]"] for k in ENDS if "far" in k) / (3.0 * FREE.thickness)
+    assert stress * soft[0, 0] / STRAIN == pytest.approx(1.0, abs=EXACT)
+    assert row["strain_zz"] == pytest.approx(STRAIN * soft[0, 1] / soft[0, 0], rel=EXACT)
+
+
 def test_plane_strain_is_a_prescribed_strain_of_zero():
     _, flat = strip(laminate("[0]_2"), fx.GeneralisedPlaneStrain(2.0, strain_zz=0.0))
     c = CFRP.stiffness()
@@ -516,6 +537,8 @@ def test_what_is_not_possible_is_said():
     loose = made(supports=[fx.Displacement("far_lower", x=0.0, y=0.0)])
     with pytest.raises(fx.FxcrackError, match="free to move along z"):
         loose.run(fx.Static(until=fx.Time(1.0)), grow=[], progress=False)
+    with pytest.raises(fx.InputError, match="GeneralisedPlaneStrain"):
+        fx.write_deck(loose, [fx.Static(until=fx.Time(1.0))], "never.inp")
     with pytest.raises(fx.InputError, match="force_zz"):
         fx.GeneralisedPlaneStrain(strain_zz=0.1, force_zz=1.0)
     with pytest.raises(fx.InputError, match="thickness"):

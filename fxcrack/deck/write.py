@@ -18,10 +18,12 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
+from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import (
     BodyForce,
@@ -52,7 +54,8 @@ from fxcrack.deck.write_mesh import MeshLines
 from fxcrack.deck.write_properties import criterion_lines, material_lines
 from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import AnySupport
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
@@ -128,6 +131,8 @@ class _Writer:
     def lines(self, steps: Sequence[Static | Cycles | Explicit | DeckStep]) -> list[str]:
         """The whole deck."""
         given = self.scene.input
+        if isinstance(given.model, GeneralisedPlaneStrain):
+            refuse("the model GeneralisedPlaneStrain")
         if given.stabilise is not None:
             refuse("the argument stabilise of the scene")
         if given.order is not None and given.order != self.scene.mesh.order:
@@ -186,7 +191,9 @@ class _Writer:
         x[:, : self.mesh.points.shape[1]] = self.mesh.points[nodes]
         out = ["*INITIAL CONDITIONS, TYPE=VELOCITY"]
         for i, component in enumerate(self.inertia.velocity):
-            values = np.full(len(nodes), component) if not callable(component) else component(x.T)
+            values = np.full(len(nodes), component)
+            if callable(component):
+                values = numbers_at("Inertia", f"velocity[{i}]", component, x)
             out += [
                 f"{node + 1}, {i + 1}, {number(v)}"
                 for node, v in zip(nodes, values, strict=True)

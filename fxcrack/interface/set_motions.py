@@ -40,7 +40,8 @@ def coupled_motions(
     """
     gdim = layout.gdim
     r = np.zeros((len(x), 3))
-    r[:, :gdim] = x[:, :gdim] - np.asarray(coupling.point)
+    r[:, :gdim] = x[:, :gdim]
+    r[:, : len(coupling.point)] -= np.asarray(coupling.point)
     axes = np.eye(3)
     turns = [np.cross(axes[i], r) for i in (range(3) if gdim == 3 else (2,))]
     parts, unknowns = [], []

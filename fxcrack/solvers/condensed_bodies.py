@@ -44,6 +44,8 @@ class CondensedBodies:
             return "generalised plane strain"
         if continuum.founded:
             return "stabilise"
+        if any(p.interface.stiffness is not None for p in self._solver.pairs):
+            return "bonds with a stiffness"
         if forms is None:
             return ""
         if forms.dynamic:
