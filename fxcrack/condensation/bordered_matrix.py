@@ -93,12 +93,8 @@ class BorderedMatrix:
         self._transform = coordinates.sparse
         self._inner: PETSc.Mat | None = None  # without borders, where that is another matrix
         self._where: Ints = np.zeros(0, dtype=np.int64)  # its entries among those of the whole
-<<<<<<< HEAD
         self._where_shared: Ints = self._where  # likewise those of shared unknowns
-        inner = stiffness.ptap(coordinates.sparse)
-=======
-        inner = _with_springs(stiffness.ptap(coordinates.transform), coordinates)
->>>>>>> main
+        inner = _with_springs(stiffness.ptap(coordinates.sparse), coordinates)
         self.on_retained = np.zeros((coordinates.n_retained, len(borders)))
         self._shared = SharedColumns(coordinates) if len(coordinates.shared) else None
         if not borders and self._shared is None:

@@ -22,8 +22,8 @@ from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
-from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
+from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import (
     BodyForce,

@@ -45,15 +45,13 @@ Columns of T, in this order on each rank:
 * on rank 0 only, last: retained jumps, one column per prescribed displacement component
   (u = d times its shape), and empty columns for the borders of force patterns and monitors.
 
-<<<<<<< HEAD
-A fixed jump has no column: it is zero. Unknowns that all nodes share (the strain out of the plane
-of generalised plane strain) have one inner column together, with ones in the rows of their dofs.
-=======
 A fixed jump has no column: it is zero. Where a bond has a spring of its own, a fixed or retained
 jump has an inner coordinate beside it, the elongation e of the spring
 (:mod:`fxcrack.interface.bond_springs`): R (e + delta) in place of R delta. T has more columns than
 rows then.
->>>>>>> main
+
+Unknowns that all nodes share (the strain out of the plane of generalised plane strain) have one
+inner column together, with ones in the rows of their dofs.
 
 Dofs that follow others by couplings and equations (:mod:`fxcrack.interface.following`) have no
 column of their own but rows of T with the columns of what they follow. The jump of a slave node
@@ -82,12 +80,8 @@ from fxcrack.interface.following import Following
 from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
-<<<<<<< HEAD
-from fxcrack.interface.pairing import Pair
-from fxcrack.interface.shared_unknowns import SharedUnknowns
-=======
 from fxcrack.interface.pair import Pair
->>>>>>> main
+from fxcrack.interface.shared_unknowns import SharedUnknowns
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 FIXED, FREE, RETAINED = 0, 1, 2
@@ -232,13 +226,9 @@ def build_coordinates(
     free_jump = np.zeros_like(follows)
     for link, role, yields in zip(links, roles, elastic, strict=True):
         follows[link.nodes, :gdim] = True
-<<<<<<< HEAD
-        free_jump[link.nodes, :gdim] = role[link.slaves] == FREE
+        free_jump[link.nodes, :gdim] = ((role == FREE) | yields)[link.slaves]
     shared = SharedUnknowns(layout, supports)
     shared.keep_one(own)
-=======
-        free_jump[link.nodes, :gdim] = ((role == FREE) | yields)[link.slaves]
->>>>>>> main
     local = layout.dofs(nodes.local)
     follows_here = follows[nodes.mine]
     own[local[follows_here]] = free_jump[nodes.mine][follows_here]
@@ -295,14 +285,9 @@ def build_coordinates(
     if layout.shared:
         sparse = _assemble(shared.without(single), *given)
     return JumpCoordinates(
-<<<<<<< HEAD
         transform, sparse, at_shared, frames, held, index, n_retained, n_supports, n_borders,
         n_inner, first, np.flatnonzero(own),
-=======
-        transform, frames, held, index, n_retained, n_supports, n_borders, n_inner, first,
-        np.flatnonzero(own),
         _springs(layout, nodes, links, frames, springs, elastic, column),
->>>>>>> main
     )  # fmt: skip
 
 

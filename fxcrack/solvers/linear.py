@@ -83,14 +83,11 @@ class LinearSolver(InterfaceSolver):
                 "CondensedOptions(method='iterative') is not possible with shells, whose stiffness "
                 "against bending and stretching differs too much; leave method out"
             )
-<<<<<<< HEAD
         if options.method == "iterative" and continuum.layout.shared:
             raise InputError(
                 "CondensedOptions(method='iterative') is not possible in generalised plane strain, "
                 "whose strain out of the plane links all nodes; leave method out"
             )
-        if options.method == "iterative" or (options.method == "auto" and self._too_large()):
-=======
         yielding = [p.title for p in pairs if p.interface.stiffness is not None]
         if options.method == "iterative" and yielding:
             raise InputError(
@@ -100,7 +97,6 @@ class LinearSolver(InterfaceSolver):
         if options.method == "iterative" or (
             options.method == "auto" and not yielding and self._too_large()
         ):
->>>>>>> main
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(
                 continuum, pairs, supports, rtol=options.rtol, cap_mb=options.retained_mb
