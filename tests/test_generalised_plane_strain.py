@@ -213,14 +213,14 @@ def tear(comm: MPI.Intracomm, order: int = 1) -> fx.Scene:
 @pytest.mark.mpi
 @pytest.mark.three
 def test_a_sheared_strip_tears_in_mode_three():
-    # G = mu w^2/h of a long strip of half height h whose edges move by +-w (Rice 1968); the mean
-    # of G over a cell is exact in a strip that is even along its length, so that what is left is
-    # the crack closure on a coarse mesh: 1.3 % and 0.2 %
+    # G = mu w^2/h of a long strip of half height h whose edges move by +-w (Rice 1968). Far from its
+    # ends growth by an element adds a slice ahead and takes one behind, so that G is exact on any
+    # even mesh
     scene = tear(WORLD)
     history = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)
     row = history.rows[-1]
     wanted = 210e3 / 2.6 * 1e-6 / 1.5
-    assert row["GIII[bond]"] == pytest.approx(wanted, rel=0.03)
+    assert row["GIII[bond]"] == pytest.approx(wanted, rel=1e-8)
     assert abs(row["GI[bond]"]) + abs(row["GII[bond]"]) < 1e-9 * wanted
 
 
@@ -242,18 +242,24 @@ def arms(model: Any, comm: MPI.Intracomm = WORLD, **options: Any) -> fx.Scene:
     )
 
 
-def test_an_isotropic_beam_lies_between_plane_stress_and_plane_strain():
+def test_an_isotropic_arm_lies_between_plane_stress_and_plane_strain():
     found = {}
     for model in (fx.PlaneStress(), fx.PlaneStrain(), fx.GeneralisedPlaneStrain()):
-        history = arms(model, MPI.COMM_SELF).run(
-            fx.Static(until=fx.Time(0.02)), grow=[], progress=False
+        across = {"z": 0.0} if isinstance(model, fx.GeneralisedPlaneStrain) else {}
+        scene = dcb(
+            MPI.COMM_SELF,
+            dx=1.0,
+            ny=2,
+            model=model,
+            supports=[
+                fx.Displacement("pin_top", x=0.0, y=1.0),
+                fx.Displacement("bottom", x=0.0, y=0.0, **across),
+            ],
         )
+        history = scene.run(fx.Static(until=fx.Time(0.02)), grow=[], progress=False)
         found[type(model).__name__] = history.rows[-1]["R[pin_top.y]"]
     soft, stiff = found["PlaneStress"], found["PlaneStrain"]
-    free = found["GeneralisedPlaneStrain"]
-    assert soft < free < stiff
-    # bending alone strains nothing on average: e_zz of the section vanishes, as in plane strain
-    assert free == pytest.approx(stiff, rel=1e-3)
+    assert soft < found["GeneralisedPlaneStrain"] < stiff * (1.0 - 1e-6)
 
 
 @pytest.mark.mpi
@@ -395,9 +401,10 @@ def test_a_thick_cylinder_with_free_ends_is_that_of_lame():
         monitors=[fx.Monitor("bore", (0.0, 0.0, 1.0), name="along")],
     )
     row = scene.run(fx.Static(until=fx.Time(1.0)), progress=False).rows[-1]
-    # s_r + s_theta = 2 p a^2/(b^2 - a^2) everywhere; first-order elements with n = 12 are 0.3 % off
+    # s_r + s_theta = 2 p a^2/(b^2 - a^2) everywhere. The mean of the in-plane stresses follows from
+    # the loads alone, on any mesh, and the chords of bore and rim change both areas alike
     wanted = -STEEL.nu / STEEL.E * 2.0 * pressure * a**2 / (b**2 - a**2)
-    assert row["strain_zz"] == pytest.approx(wanted, rel=0.005)
+    assert row["strain_zz"] == pytest.approx(wanted, rel=1e-8)
     assert abs(row["m[along]"]) < 1e-9 * abs(wanted)
 
 
