@@ -213,8 +213,8 @@ def tear(comm: MPI.Intracomm, order: int = 1) -> fx.Scene:
 @pytest.mark.mpi
 @pytest.mark.three
 def test_a_sheared_strip_tears_in_mode_three():
-    # G = mu w^2/h of a long strip of half height h whose edges move by +-w (Rice 1968). Far from its
-    # ends growth by an element adds a slice ahead and takes one behind, so that G is exact on any
+    # G = mu w^2/h of a long strip of half height h whose edges move by +-w (Rice 1968). Far from
+    # its ends growth by an element turns a slice ahead into one behind, so that G is exact on any
     # even mesh
     scene = tear(WORLD)
     history = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)
