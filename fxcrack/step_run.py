@@ -75,10 +75,12 @@ def check_step(
             )
         return
     for pair in analysis.pairs:
-        if pair.interface.stiffness is not None:
+        if pair.interface.stiffness is not None and not analysis.linear:
             raise InputError(
                 f"interface '{pair.interface.title}': bonds with a stiffness of their own are for "
-                f"Explicit; leave stiffness out in {type(step).__name__} steps, which hold exactly"
+                "linear bodies and for Explicit; leave stiffness out in "
+                f"{type(step).__name__} steps of nonlinear or moving bodies, whose bonds hold "
+                "exactly"
             )
     effects, why = analysis.effects, analysis.plan.why
     if isinstance(analysis.solver, ExplicitSolver):
@@ -147,7 +149,8 @@ def run_step(
     may_grow += [False] * (len(analysis.pairs) - len(analysis.debonds))
     analysis.activate(chosen)
     for g in analysis.active:
-        if not len(g.tips()):
+        # without a bonded set the scene has said so already
+        if g.debond.interface.bonded is not None and not len(g.tips()):
             log.warn("%s, so nothing can debond", why_no_tip(g.front))
     _check_lengths(analysis, step)
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]

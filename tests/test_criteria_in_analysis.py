@@ -135,6 +135,7 @@ def test_second_order_faces_start_at_the_closed_form_load() -> None:
     assert np.abs(demo.onset_errors(20, order=2)).max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.verification
 def test_shear_strength_under_remote_shear() -> None:
     ahead, width = 0.2, 40.0

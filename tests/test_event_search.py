@@ -197,6 +197,7 @@ def yielding(first: int = 5) -> fx.Scene:
     )
 
 
+@pytest.mark.slow
 def test_search_among_yielding_bodies_and_softening_bonds_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -352,6 +352,7 @@ def test_warnings(caplog: pytest.LogCaptureFixture) -> None:
     assert "no criterion" in caplog.text
 
 
+@pytest.mark.slow
 def test_step_release_runs_through_tough_parts_and_progressive_release_does_not() -> None:
     """A crack that runs at G = 1.2 G_c comes to a part with twice the toughness."""
     reached = []

@@ -122,6 +122,7 @@ def test_arms_that_turn_far_open_steadily_too(comm: MPI.Intracomm) -> None:
     assert largest_imbalance(history) < 1e-4
 
 
+@pytest.mark.slow
 def test_the_slip_of_flexure_grows_while_its_deflection_snaps_back() -> None:
     history = flexure(17.0, 38.0, by_force=True, stepping="opening", opening=("lower", "upper"))
     found = onsets(history)

@@ -202,6 +202,7 @@ def test_ramp_over_increments_needs_increments():
     assert abs(final["balance"]) < 1e-9 * final["external_work"]  # piecewise linear throughout
 
 
+@pytest.mark.slow
 def test_viscosity_spends_energy_and_fades_with_small_increments():
     spent = {}
     for viscosity in (0.0, 1e-3, 1e-2):

@@ -56,9 +56,12 @@ class Interface:
             only one; so it is where no slave node has a master at the start. Node-to-surface bonds
             of meshes that do not match hold only if the slave is the finer and softer side.
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
-        stiffness: Of bonds in ``Explicit``, force/length^3: normal, along the growth direction and
-            along the front, or "auto": that of the cells beside them. ``None``, as everywhere else:
-            bonds are exact, which costs nothing; a stiffness shortens the increment and lowers G.
+        stiffness: Of bonds, force/length^3: normal, along the growth direction and along the front.
+            In ``Explicit`` also "auto": that of the cells beside them. Between shells of linear
+            bodies also "arms": what the faces of the arms yield beside the motion of their
+            reference surfaces (:mod:`fxcrack.continuum.face_compliance`), so that the root of a
+            crack turns and slides as that of solids. ``None``: bonds are exact, which costs
+            nothing; in ``Explicit`` a stiffness shortens the increment and lowers G.
         strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
             and ignored otherwise.
         name: What the history calls the interface; the slave's name by default.
@@ -108,13 +111,15 @@ class Interface:
         self._check_stiffness(where)
 
     def _check_stiffness(self, where: str) -> None:
-        if self.stiffness is None or (isinstance(self.stiffness, str) and self.stiffness == "auto"):
+        if isinstance(self.stiffness, str) and self.stiffness in ("auto", "arms"):
+            return
+        if self.stiffness is None:
             return
         given = list_of(self.stiffness)
         if given is None or len(given) != 3:
             raise InterfaceError(
-                f"{where}: stiffness = {shown(self.stiffness)} must be 'auto' or three numbers per "
-                "area, normal, along the growth direction and along the front"
+                f"{where}: stiffness = {shown(self.stiffness)} must be 'auto', 'arms' or three "
+                "numbers per area, normal, along the growth direction and along the front"
             )
         positive(where, **{f"stiffness[{i}]": k for i, k in enumerate(given)})
         keep(self, stiffness=tuple(float(k) for k in given))
