@@ -107,6 +107,14 @@ CALLS: list[Call] = [
     (fx.ByTemperature, {"table": {0.0: STEEL}}),
     (fx.PlaneStrain, {"thickness": 1.0}),
     (fx.PlaneStress, {"thickness": 1.0}),
+    (
+        fx.GeneralisedPlaneStrain,
+        {
+            "thickness": 1.0, "strain_zz": None, "curvature_x": 0.0, "curvature_y": 0.0,
+            "force_zz": 1.0, "amplitude": fx.Ramp(),
+        },
+    ),
+    (fx.GeneralisedPlaneStrain, {"strain_zz": 0.1}),
     (fx.Amplitude, {"times": (0.0, 1.0), "values": (0.0, 1.0)}),
     (
         fx.Displacement,
