@@ -54,6 +54,7 @@ from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.pair import Pair
+from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.supports import AnySupport
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
@@ -217,6 +218,8 @@ class _Writer:
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
+        if interface.is_rigid:
+            refuse(f"interface '{title}': a rigid surface as master")
         if interface.stiffness is not None:
             refuse(f"interface '{title}': stiffness of bonds")
         if interface.pairing is not None and self.explicit:
@@ -480,11 +483,11 @@ def _type(interface: Interface) -> str:
     return "" if interface.pairing is None else f", TYPE={words[interface.pairing]}"
 
 
-def _group(face: str | Face) -> str:
+def _group(face: str | Face | RigidSurface) -> str:
     """Name of the group of facets of a side of an interface."""
     if isinstance(face, str):
         return face
-    refuse("the face of a shell")
+    refuse("the face of a shell" if isinstance(face, Face) else "a rigid surface")
 
 
 def _as_deck_step(scene: Scene, step: Static | Cycles | Explicit, i: int) -> DeckStep:

@@ -37,11 +37,11 @@ from fxcrack.continuum.lumped_mass import lumped_mass
 from fxcrack.continuum.starting_velocity import starting_velocity
 from fxcrack.continuum.term import Term
 from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.frames import local_frames
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import global_vectors
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pair import Pair
-from fxcrack.interface.pairing import local_frames
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_elastic import ElasticBonds

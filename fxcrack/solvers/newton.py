@@ -117,7 +117,7 @@ class NewtonSolver(InterfaceSolver):
 
     def _condense(self, roles: Roles, loads: Array) -> Condensed:
         tangent, n_forces = self.tangent, len(self.loads)
-        n_borders = tangent.assemble(self._followed)
+        n_borders = tangent.assemble(self.pairs, self._followed)
         tangent.release_memory()
         start = time.perf_counter()
         coordinates = build_coordinates(
