@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # noqa: F401  # isort: skip  (orders MPI before DOLFINx)
 from fxcrack.base.errors import EnergyError, FxcrackError, InputError
+from fxcrack.base.log import show as show_log
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
@@ -219,6 +220,7 @@ __all__ = [
     "ply_results",
     "read_deck",
     "read_mesh",
+    "show_log",
     "tip_table",
     "with_usual_names",
     "write_deck",

@@ -399,7 +399,7 @@ def test_a_surface_that_does_not_fit_is_refused(
         ({"master": fx.RigidSphere((0, 0, 0), 1.0), "symmetry": True}, "needs a plane"),
         ({"master": PLANE, "symmetry": True, "friction": 0.3, "contact": True}, "friction is not"),
         ({"master": PLANE, "pairing": "surface-to-surface"}, "no facets to average"),
-        ({"master": PLANE, "stiffness": "auto"}, "no rigid surfaces"),
+        ({"master": PLANE, "stiffness": "auto"}, "not available on a rigid"),
         ({"master": PLANE, "symmetry": "yes"}, "must be True or False"),
     ],
 )

@@ -41,8 +41,9 @@ class Interface:
             :class:`fxcrack.RigidCylinder` or :class:`fxcrack.RigidSphere`; it has no nodes, and a
             jump is the displacement of the slave node.
         bonded: The initially bonded slave nodes: the name of a group, a function of positions of
-            shape (3, n) that returns n booleans, an array of booleans per slave node (in the
-            order of ``Pair.surface``), or ``None``: all of them, and no tip exists.
+            shape (3, n) that returns n booleans (nodes on the border of its region are bonded,
+            ``>`` and ``>=`` mean the same), an array of booleans per slave node (in the order of
+            ``Pair.surface``), or ``None``: all of them, and no tip exists.
         contact: Open faces cannot pass through each other (unilateral).
         friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
             a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.
@@ -67,9 +68,12 @@ class Interface:
             only one; so it is where no slave node has a master at the start. Node-to-surface bonds
             of meshes that do not match hold only if the slave is the finer and softer side.
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
-        stiffness: Of bonds in ``Explicit``, force/length^3: normal, along the growth direction and
-            along the front, or "auto": that of the cells beside them. ``None``, as everywhere else:
-            bonds are exact, which costs nothing; a stiffness shortens the increment and lowers G.
+        stiffness: Of bonds, force/length^3: normal, along the growth direction and along the front.
+            In ``Explicit`` also "auto": that of the cells beside them. Between shells of linear
+            bodies also "arms": what the faces of the arms yield beside the motion of their
+            reference surfaces (:mod:`fxcrack.continuum.face_compliance`), so that the root of a
+            crack turns and slides as that of solids. ``None``: bonds are exact, which costs
+            nothing; in ``Explicit`` a stiffness shortens the increment and lowers G.
         strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
             and ignored otherwise.
         name: What the history calls the interface; the slave's name by default.
@@ -144,18 +148,20 @@ class Interface:
             )
         if self.stiffness is not None:
             raise InterfaceError(
-                f"{where}: bonds with a stiffness belong to Explicit, which has no rigid surfaces; "
-                "leave stiffness out"
+                f"{where}: bonds with a stiffness are not available on a rigid surface; leave "
+                "stiffness out"
             )
 
     def _check_stiffness(self, where: str) -> None:
-        if self.stiffness is None or (isinstance(self.stiffness, str) and self.stiffness == "auto"):
+        if isinstance(self.stiffness, str) and self.stiffness in ("auto", "arms"):
+            return
+        if self.stiffness is None:
             return
         given = list_of(self.stiffness)
         if given is None or len(given) != 3:
             raise InterfaceError(
-                f"{where}: stiffness = {shown(self.stiffness)} must be 'auto' or three numbers per "
-                "area, normal, along the growth direction and along the front"
+                f"{where}: stiffness = {shown(self.stiffness)} must be 'auto', 'arms' or three "
+                "numbers per area, normal, along the growth direction and along the front"
             )
         positive(where, **{f"stiffness[{i}]": k for i, k in enumerate(given)})
         keep(self, stiffness=tuple(float(k) for k in given))

@@ -9,8 +9,9 @@ whichever side is the slave (surface-to-surface, :mod:`fxcrack.interface.mortar`
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -41,6 +42,9 @@ from fxcrack.interface.surface import FacetSurface, gather_surface
 
 _FACING = -0.5
 """Cosine between the outward normals of two surfaces that face each other, at most."""
+
+_BORDER = 1e-6
+"""Distance to the border of the bonded region, in facet lengths, up to which a node is on it."""
 
 
 def friction_of(interface: Interface, surface: FacetSurface) -> Array | None:
@@ -91,7 +95,7 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
             log.warn("%s; they are ignored", found)
         return np.asarray(np.isin(surface.dofs, named))
     if callable(chosen):
-        return marks_at(where, "bonded", chosen, surface.x, error=InterfaceError)
+        return _within(where, chosen, surface)
     marks = np.asarray(chosen)
     if marks.shape != (surface.n_nodes,):
         raise InterfaceError(
@@ -99,6 +103,26 @@ def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continu
             f"{surface.n_nodes} slave nodes is needed"
         )
     return as_marks(where, "bonded", marks, error=InterfaceError)
+
+
+def _within(where: str, region: Callable[..., Any], surface: FacetSurface) -> Bools:
+    """Slave nodes in a region of the user or on its border, shape (n_nodes,).
+
+    A crack that begins at x = 30 has its tip in the node there, whether ``x[0] >= 30`` or
+    ``x[0] > 30`` says so and whatever the last digit of the node's coordinate is. A node counts
+    where a point within _BORDER facet lengths of it does, in a direction of the axes; none of these
+    points leaves the box around the surface.
+    """
+    low, high = surface.x.min(axis=0), surface.x.max(axis=0)
+    found = marks_at(where, "bonded", region, surface.x, error=InterfaceError)
+    reach = _BORDER * surface.facet_size
+    for axis in np.flatnonzero(high - low > reach):
+        for side in (-1.0, 1.0):
+            x = surface.x.copy()
+            x[:, axis] += side * reach
+            np.clip(x, low, high, out=x)
+            found |= marks_at(where, "bonded", region, x, error=InterfaceError)
+    return found
 
 
 def grown_together(slave: FacetSurface, master: FacetSurface, where: str) -> Bools:

@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
+from fxcrack.equilibrium.cohesive_bonds import CohesiveBonds
 from fxcrack.interface.finite_sliding import changing, names_changing, renewed, with_changing
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
@@ -136,6 +137,21 @@ def _master_of(continuum: Continuum, pair: Pair) -> FacetSurface | RigidSurface:
     return master
 
 
+def pulling(index: list[Ints], force: Array, soft: CohesiveBonds) -> list[Bools]:
+    """Nodes per pair whose bonds are released but still carry a force, shape (n_nodes,).
+
+    Args:
+        index: Number of each retained jump per pair, shape (n_nodes, gdim), -1 where there is none.
+        force: Given forces, shape (n_retained,), force.
+        soft: Softening bonds.
+    """
+    carried = np.append(force != 0.0, False)
+    out = [carried[numbers].any(axis=1) for numbers in index]
+    for bond in soft.bonds:
+        out[bond.where[0]][bond.where[1]] = True
+    return out
+
+
 class PairingEnergy:
     """Energy taken by new pairings of faces that slide.
 
@@ -183,4 +199,4 @@ class PairingEnergy:
             self._before = None
 
 
-__all__ = ["DeformedInterfaces", "PairingEnergy"]
+__all__ = ["DeformedInterfaces", "PairingEnergy", "pulling"]

@@ -139,6 +139,11 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 f"interface '{interface.title}': bonds of explicit dynamics hold in all "
                 "directions; leave normal_only out"
             )
+        if interface.stiffness == "arms":
+            raise InputError(
+                f"interface '{interface.title}': stiffness='arms' is that of shells on surface "
+                "meshes, which Explicit does not have; give 'auto' or three numbers per area"
+            )
         if interface.pairing == "surface-to-surface":
             raise InputError(
                 f"interface '{interface.title}': surface-to-surface weights would give lumped "
