@@ -255,6 +255,75 @@ def test_without_symmetry_the_energy_is_that_of_the_half(comm: MPI.Intracomm) ->
     assert found["released_energy"] == pytest.approx(known["released_energy"], rel=SAME, abs=SAME)
 
 
+def pulled(comm: MPI.Intracomm, *planes: str, left: float, contact: bool = False) -> fx.Scene:
+    """A block with a crack of half length 1 on y = 0, pulled at its top; planes are held."""
+    bond = fx.Interface(
+        "y0", PLANE, bonded=lambda x: np.abs(x[0]) >= 1.0 - 1e-9, symmetry=True, name="crack",
+        contact=contact,
+    )  # fmt: skip
+    supports = [fx.Displacement(name, x=0.0) for name in planes]
+    n = round((2.0 - left) / 0.25)
+    return fx.Scene(
+        body(comm, np.linspace(left, 2.0, n + 1), np.linspace(0.0, 2.0, 5)),
+        materials=STEEL,
+        model=fx.PlaneStrain(thickness=1.0),
+        supports=[fx.Displacement("y1", x=0.0, y=0.01), *supports],
+        debonds=[fx.Debond(bond, fx.VCCT(GIc=0.1))],
+    )
+
+
+def test_quarter_of_a_plate(comm: MPI.Intracomm) -> None:
+    half, quarter = pulled(comm, left=-2.0), pulled(comm, "x0", left=0.0)
+    a, b = (scene.run(fx.Static(until=fx.Releases(n))) for scene, n in ((half, 2), (quarter, 1)))
+    assert b["time"][1] == pytest.approx(a["time"][1], rel=SAME)
+    assert 2.0 * b["R[y1.y]"][1] == pytest.approx(a["R[y1.y]"][1], rel=SAME)
+    assert b["GI[crack]"][1] == pytest.approx(a["GI[crack]"][1], rel=SAME)
+
+
+def test_two_planes_that_share_an_edge(comm: MPI.Intracomm) -> None:
+    """The second plane is bonded where the first is open; with contact there its node has two."""
+    other = fx.Interface("x0", fx.RigidPlane((0.0, 0.0), (1.0, 0.0)), symmetry=True, name="other")
+    known = pulled(comm, "x0", left=0.0).run(fx.Static(until=fx.Releases(1)))
+    for contact in (False, True):
+        given = pulled(comm, left=0.0, contact=contact).input
+        scene = fx.Scene(
+            given.mesh,
+            materials=given.materials,
+            model=given.model,
+            supports=given.supports,
+            debonds=given.debonds,
+            bonds=[other],
+        )
+        if contact:
+            with pytest.raises(InterfaceError, match=r"Displacement\(group, x=0.0\) in place"):
+                scene.run(fx.Static(until=fx.Releases(1)))
+        else:
+            found = scene.run(fx.Static(until=fx.Releases(1)))
+            assert found["R[y1.y]"] == pytest.approx(known["R[y1.y]"], rel=SAME, abs=SAME)
+            assert found["GI[crack]"] == pytest.approx(known["GI[crack]"], rel=SAME)
+
+
+def test_the_whole_boundary_may_be_the_slave(comm: MPI.Intracomm) -> None:
+    """Nodes on its edge have an oblique mean normal; what does not lie on the plane has no part."""
+    given = pulled(comm, "x0", left=0.0)
+    known = given.run(fx.Static(until=fx.Releases(1)))
+    mesh = given.input.mesh.joined("outside", ["y0", "x0", "x1", "y1"])
+    bond = fx.Interface(
+        "outside", PLANE, bonded=lambda x: (x[0] >= 1.0 - 1e-9) & (x[1] < 1e-9), symmetry=True,
+        name="crack",
+    )  # fmt: skip
+    scene = fx.Scene(
+        mesh,
+        materials=STEEL,
+        model=fx.PlaneStrain(thickness=1.0),
+        supports=given.input.supports,
+        debonds=[fx.Debond(bond, fx.VCCT(GIc=0.1))],
+    )
+    found = scene.run(fx.Static(until=fx.Releases(1)))
+    for name in ("time", "R[y1.y]", "GI[crack]", "area[crack]"):
+        assert found[name] == pytest.approx(known[name], rel=SAME, abs=SAME), name
+
+
 # -- contact and friction ------------------------------------------------------------------
 
 

@@ -22,7 +22,7 @@ from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.interface.frames import local_frames
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.rigid import RigidSurface
-from fxcrack.interface.surface import FacetSurface
+from fxcrack.interface.surface import FacetSurface, facet_element
 
 _FACING = -0.5
 """Cosine between the outward normal of a slave node and the normal of the surface, at most."""
@@ -49,6 +49,24 @@ def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
             f"{where}: {surface} is no plane of symmetry of bodies of revolution; its normal must "
             "be the axis, (0, 1) or (0, -1), or leave symmetry out"
         )
+
+
+def _facing(surface: FacetSurface, normals: Array) -> Array:
+    """Least cosine between a rigid surface's normal at a node and those of the facets around it.
+
+    Args:
+        surface: Slave surface.
+        normals: Normals of the rigid surface at its nodes, shape (n_nodes, 3).
+
+    Returns:
+        Shape (n_nodes,): -1 where a facet lies flat on the rigid surface, be it beside a facet that
+        stands upright on the same edge; 1 where there is no facet.
+    """
+    points = np.asarray(facet_element(surface.kind, surface.order).points)
+    unit, _ = surface.facet_normals(points)
+    out = np.ones(surface.n_nodes)
+    np.minimum.at(out, surface.facets, np.einsum("fmc,fmc->fm", unit, normals[surface.facets]))
+    return out
 
 
 def find_partners(
@@ -79,7 +97,7 @@ def find_partners(
     surface.check_model(where, continuum.model, continuum.gdim)
     gap, normals = surface.measure(slave.x)
     near = np.abs(gap) <= tolerance
-    facing = np.einsum("nc,nc->n", slave.normals, normals)
+    facing = _facing(slave, normals)
     there = bonded & near if np.any(bonded & near) else near
     behind = there & (facing > -_FACING)
     if np.any(behind) and 2 * int(behind.sum()) >= int(there.sum()):
@@ -88,9 +106,9 @@ def find_partners(
         raise InterfaceError(
             f"{where}: the body is on the wrong side of the {surface}: at "
             f"{format_point(slave.x[i])} the outward normal of '{slave.name}' is "
-            f"{format_point(slave.normals[i])}, that of the rigid surface "
-            f"{format_point(normals[i])}, and the two must be opposite; {side}, or name the "
-            "surface of the body that faces it"
+            f"{format_point(slave.normals[i])}, and that of the rigid surface, "
+            f"{format_point(normals[i])}, must be opposite; {side}, or name the surface of the "
+            "body that faces it"
         )
     paired = near & (facing < _FACING)
     lost = bonded & ~paired
@@ -136,7 +154,7 @@ def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
     x = pair.surface.x.copy()
     x[:, :gdim] += u_slave
     distance, normals = surface.measure(x)
-    facing = np.einsum("nc,nc->n", pair.whole_surface.moved(x).normals, normals) < _FACING
+    facing = _facing(pair.whole_surface.moved(x), normals) < _FACING
     over = ~bonded & (pair.paired | facing)
     near = over & (distance < _NEAR * pair.surface.facet_size)
     turned = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _TURNED

@@ -419,6 +419,14 @@ def check_slaves(
     for pair, taking_part in zip(pairs, jumped, strict=True):
         for node in np.flatnonzero(taking_part):
             dof = int(pair.surface.dofs[node])
+            if dof in seen and pair.rigid is not None:
+                raise InterfaceError(
+                    f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
+                    f"'{seen[dof]}' and of '{pair.title}', and a node can be a slave only once; on "
+                    "a plane of symmetry without a crack take Displacement(group, x=0.0) in place "
+                    "of an interface, and where cracks run in both let the slave surface of one "
+                    "end before the common edge"
+                )
             if dof in seen:
                 raise InterfaceError(
                     f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
