@@ -182,7 +182,7 @@ def run(
     from fxcrack.deck.run import check_only, run_deck
 
     if check:
-        check_only(deck, rank_0_console())
+        check_only(deck, rank_0_console(), order=order)
         return
     folder = Path("out") / deck.stem if out is None else out
     run_deck(deck, folder, rank_0_console(), order=order, usual_names=usual_names, report=report)

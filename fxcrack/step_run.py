@@ -149,7 +149,8 @@ def run_step(
     may_grow += [False] * (len(analysis.pairs) - len(analysis.debonds))
     analysis.activate(chosen)
     for g in analysis.active:
-        if not len(g.tips()):
+        # without a bonded set the scene has said so already
+        if g.debond.interface.bonded is not None and not len(g.tips()):
             log.warn("%s, so nothing can debond", why_no_tip(g.front))
     _check_lengths(analysis, step)
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]

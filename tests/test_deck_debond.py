@@ -314,8 +314,11 @@ def test_nodes_of_the_bond_off_the_slave_surface_are_warned_of(tmp_path, caplog)
 def test_no_node_set_bonds_the_whole_pair(tmp_path, caplog):
     model = BONDED.replace("TYPE=CONTACT\nTOP, BOTTOM, BOND", "TYPE=CONTACT\nTOP, BOTTOM")
     with caplog.at_level(logging.WARNING, "fxcrack"):
-        fx.read_deck(write(tmp_path, bonded(model=model))).scene.close()
+        deck = fx.read_deck(write(tmp_path, bonded(model=model)))
+        deck.run()
+        deck.scene.close()
     assert "the whole pair is bonded and has no crack tip" in caplog.text
+    assert caplog.text.count("no crack tip") == 1
 
 
 def test_supports_on_the_crack_surface_are_warned_of(tmp_path, caplog):

@@ -253,7 +253,7 @@ def test_ngen_on_a_circle(tmp_path):
         ("*ELGEN\n1, 90000, 1, 1, 90000, 1, 1", "would make"),
         ("*ELCOPY, OLD SET=NO", "no element set 'NO'"),
         ("*NSET, NSET=A, GENERATE\n5, 1, 1", "increment 1 does not lead from 5 to 1"),
-        ("*NSET, NSET=A\nNO", "there is no set 'NO' yet"),
+        ("*NSET, NSET=A\nNO", "there is no node set 'NO'"),
         ("*NSET, NSET=A\nLEFTT", "did you mean 'LEFT'"),
         ("*NSET, NSET=A, INSTANCE=I\n1", "there is no instance 'I'"),
         ("*NSET, NSET=A, ELSET=NO", "no element set 'NO'"),
@@ -389,3 +389,37 @@ def test_a_part_without_an_instance(tmp_path):
     text = PARTS[: PARTS.index("*ASSEMBLY")] + PARTS[PARTS.index("*MATERIAL") :]
     with pytest.raises(DeckError, match=r"part 'Bar' has no \*INSTANCE"):
         read(tmp_path, text + "*STEP\n*STATIC\n*END STEP\n")
+
+
+def test_sets_and_surfaces_may_name_what_is_defined_after_them(tmp_path):
+    early = (
+        "*NSET, NSET=BOTH\nL1, L2, 2\n*NSET, NSET=FROM, ELSET=LATER\n*ELSET, ELSET=TWO\nLATER, 1\n"
+    )
+    late = "*NSET, NSET=L1\n1\n*NSET, NSET=L2\nL3\n*NSET, NSET=L3\n4\n*ELSET, ELSET=LATER\n2\n"
+    raw = flat(tmp_path, PLATE + early + late)
+    assert at(raw, "BOTH") == [(0.0, 0.0), (0.0, 1.0), (1.0, 0.0)]
+    assert at(raw, "FROM") == [(1.0, 0.0), (1.0, 1.0), (2.0, 0.0), (2.0, 1.0)]
+    assert raw.cell_groups["TWO"].tolist() == [0, 1]
+    with pytest.raises(DeckError, match=r"line 33: \*NSET: there is no node set 'L3'"):
+        read(tmp_path, PLATE + early + late.replace("*NSET, NSET=L3", "*NSET, NSET=L4") + STEP)
+    # those of a part are made where it ends, so that its instances have them
+    inside = PARTS.replace("*END PART", "*NSET, NSET=HERE\nTHERE\n*NSET, NSET=THERE\n1\n*END PART")
+    raw = read(tmp_path, inside + "*STEP\n*STATIC\n*END STEP\n").raw
+    assert any(name.endswith(".HERE") for name in raw.groups)
+
+
+def test_a_surface_that_is_the_union_of_others(tmp_path):
+    text = PLATE + "*SURFACE, NAME=WHOLE, COMBINE=UNION\nTOP, END\n*SURFACE, NAME=TOP\nPLATE, S3\n"
+    raw = flat(tmp_path, text)
+    assert len(raw.groups["WHOLE"].rows) == 3
+    other = "*SURFACE, NAME={}, COMBINE={}\n{}\n"
+    for more, words in (
+        (
+            other.format("OTHER", "UNION", "WHOLE") + other.format("WHOLE", "UNION", "OTHER"),
+            "itself",
+        ),
+        (other.format("WHOLE", "INTERSECTION", "END, END"), "COMBINE=INTERSECTION"),
+    ):
+        bad = text + more
+        with pytest.raises(DeckError, match=words):
+            read(tmp_path, bad + STEP.replace("*END", "*DSLOAD\nWHOLE, P, 1.\n*END"))

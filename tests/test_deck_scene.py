@@ -226,9 +226,8 @@ def test_smooth_step_and_periodic_amplitudes(tmp_path):
     step = stepped("*BOUNDARY, AMPLITUDE=A", "RIGHT, 1, 1, 2.")
     found = read(tmp_path, text.format("SMOOTH STEP", "0., 0., 1., 1.") + step)
     track = next(s for s in found.arguments["supports"] if s.where == "RIGHT").amplitude
-    for t in (0.25, 0.5, 0.75):
-        assert track(t) == pytest.approx(2.0 * t**3 * (10 - 15 * t + 6 * t * t), rel=1e-12)
-    assert "the smooth step is followed by 32 straight lines" in found.report.replaced[0]
+    assert track == fx.SmoothStep((0.0, 1.0), (0.0, 2.0))
+    assert not found.report.replaced
     found = read(tmp_path, text.format("PERIODIC", "1, 6.283185307179586, 0., 1.\n0., 0.5") + step)
     track = next(s for s in found.arguments["supports"] if s.where == "RIGHT").amplitude
     assert track(0.25) == pytest.approx(3.0) and track(0.75) == pytest.approx(1.0)
@@ -236,6 +235,31 @@ def test_smooth_step_and_periodic_amplitudes(tmp_path):
     bad = text.format("TABULAR", "0., 0., 0., 1.") + step
     refused(tmp_path, bad, "times must increase")
     refused(tmp_path, PLATE + step, "there is no amplitude 'A'")
+
+
+def test_smooth_steps_over_several_steps(tmp_path):
+    """Whole smooth steps are exact; where one is cut, straight lines within 1e-3 of its height."""
+
+    def track(form, second, *, reported):
+        text = PLATE + f"*BOUNDARY\nLEFT, PINNED\n*AMPLITUDE, NAME=A, DEFINITION=SMOOTH STEP{form}"
+        found = read(tmp_path, text + stepped("*BOUNDARY, AMPLITUDE=A", "RIGHT, 1, 1, 2.") + second)
+        assert bool(found.report.replaced) == reported
+        return next(s for s in found.arguments["supports"] if s.where == "RIGHT")
+
+    back = stepped("*BOUNDARY, AMPLITUDE=B", "RIGHT, 1, 1, 2.")
+    back = "*AMPLITUDE, NAME=B, DEFINITION=SMOOTH STEP\n0., 1., 1., 0.5\n" + back
+    held = stepped("*CLOAD", "6, 2, 1.")
+    there = track("\n0., 0., 0.5, 1.\n", held, reported=False)
+    assert there.amplitude == fx.SmoothStep((0.0, 0.5, 1.0, 2.0), (0.0, 2.0, 2.0, 2.0))
+    there = track("\n0., 0., 0.5, 1.\n", back, reported=False)
+    assert there.amplitude == fx.SmoothStep((0.0, 0.5, 1.0, 2.0), (0.0, 2.0, 2.0, 1.0))
+    total = track(", TIME=TOTAL TIME\n0., 0., 1.5, 1.\n", held, reported=False)
+    assert total.x == 2.0 and total.amplitude == fx.SmoothStep((0.0, 1.5), (0.0, 1.0))
+    cut = track("\n0., 0., 1.5, 1.\n", held, reported=True)
+    exact = fx.SmoothStep((0.0, 1.5), (0.0, 2.0))
+    times = np.linspace(0.0, 1.0, 101)
+    assert max(abs(cut.amplitude(t) - exact(t)) for t in times) < 2e-3
+    assert cut.amplitude(2.0) == exact(1.0)
 
 
 def test_a_jump_between_steps_takes_a_millionth_of_the_step(tmp_path):
@@ -265,6 +289,14 @@ def test_pressures_tractions_body_forces_and_gravity(tmp_path):
     assert loads["LAST.P3"].where == "LAST.P3" and loads["PLATE.BY"].value == (0.0, 0.5)
     assert loads["gravity PLATE"].value == (0.0, -20.0)
     assert loads["LAST.P3 2"].value(np.array([[0.0], [0.5], [0.0]])) == pytest.approx(1.0)
+
+
+def test_gravity_on_a_part_of_the_model(tmp_path):
+    text = PLATE.replace("200., 0.25", "200., 0.25\n*DENSITY\n2.") + "*BOUNDARY\nLEFT, PINNED\n"
+    found = read(tmp_path, text + stepped("*DLOAD", "LAST, GRAV, 10., 0., -1., 0."))
+    (weight,) = found.arguments["loads"]
+    assert weight.value == (0.0, -20.0)
+    assert found.raw.cell_groups[weight.where].tolist() == [1]
 
 
 def test_loads_of_later_steps(tmp_path):
@@ -430,6 +462,10 @@ def test_dynamic_steps(tmp_path):
             "*SHELL GENERAL SECTION, ELSET=PLATE\n1.\n",
             "SECTION is refused: it is not",
         ),
+        ("*STEP, PERTURBATION\n*STATIC\n*END STEP\n", "PERTURBATION, a linear step"),
+        ("*RESTART, READ, STEP=1\n", "RESTART, READ is refused"),
+        ("*CONTACT DAMPING\n0.1\n", "damping between faces is not available"),
+        ("*CONTACTPRIN\n", r"did you mean \*CONTACT PRINT"),
         ("*BOUNDRY\nLEFT, 1\n", r"did you mean \*BOUNDARY"),
         ("*BOUNDARY, AMPLITUD=A\nLEFT, 1\n", "there is no amplitude 'A'"),
         ("*BOUNDARY, WEIGHT=A\nLEFT, 1\n", "the parameter WEIGHT is not available"),
@@ -438,6 +474,19 @@ def test_dynamic_steps(tmp_path):
 )
 def test_steps_and_cards_that_are_refused(tmp_path, text, words):
     refused(tmp_path, PLATE + text + (STEP if "*STEP" not in text else ""), words)
+
+
+def test_cards_that_change_nothing_are_not_refused(tmp_path):
+    text = PLATE + (
+        "*ELEMENT MATRIX OUTPUT, ELSET=PLATE, STIFFNESS=YES\n*RESTART, WRITE, FREQUENCY=0\n"
+        "*SURFACE INTERACTION, NAME=I, PAD THICKNESS=0.\n1.\n*BOUNDARY\nLEFT, PINNED\n"
+    ) + stepped(
+        "*CLOAD", "6, 2, 1.", "*CONTROLS, PARAMETERS=FIELD, FIELD=DISPLACEMENT", "0.01, 1.",
+        "*CONTACT STABILIZATION", ",",
+    )  # fmt: skip
+    report = read(tmp_path, text).report
+    assert report.ignored["*ELEMENT MATRIX OUTPUT"] == report.ignored["*RESTART"] == 1
+    assert any("*CONTACT STABILIZATION: a control of" in line for line in report.replaced)
 
 
 def test_several_refusals_are_counted(tmp_path):

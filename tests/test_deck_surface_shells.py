@@ -286,9 +286,9 @@ def test_arms_of_shells_come_apart_as_in_python(shared_path):
          "positive sides"),
         ("*SHELL SECTION, ELSET=UPPER", "*SOLID SECTION, ELSET=UPPER", "need \\*SHELL SECTION"),
         ("1., 5\n*SHELL", "-1., 5\n*SHELL", "thickness"),
-        ("*STATIC\n0.1, 1., 1E-6, 0.1", "*DYNAMIC\n0.1, 1.", "no inertia here"),
-        ("*STEP, INC=100", "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nUP, 5.\n*STEP",
-         "no temperature"),
+        ("*STATIC\n0.1, 1., 1E-6, 0.1", "*DYNAMIC\n0.1, 1.", "no \\*DENSITY"),
+        ("*STEP, INC=100", "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nUP, 5., 1.\n*STEP",
+         "over the thickness"),
         ("*DEBOND", "*DLOAD\nUPPER, P1, 1.\n*DEBOND", "load type P needs the face of solid"),
         ("*ELASTIC\n1000., 0.3", "*ELASTIC\n1000., 0.3\n*PLASTIC\n1.", "plies are linear elastic"),
         ("TYPE=S4R", "TYPE=S9R5", "S9R5 is refused"),
@@ -339,3 +339,30 @@ def test_shells_that_meet_at_common_nodes(tmp_path):
     deck.scene.close()
     exact = 1e-3 * ((1.0 / 3.0 + 1.0) * 10.0**3 / EI + 10.0 / GA + 10.0 / 200.0)
     assert found == pytest.approx(exact, rel=4e-3)  # ten elements a side
+
+
+def test_a_heated_strip_becomes_longer(tmp_path):
+    section = PLAIN + "\n*MATERIAL, NAME=M\n*EXPANSION\n1E-3\n*ELASTIC\n1000., 0."
+    section = section.replace("=PLAIN", "=M") + "\n*NSET, NSET=ALL\nA, B"
+    section += "\n*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 20."
+    found = tip(tmp_path, section, "*TEMPERATURE\nALL, 30.")
+    assert found == pytest.approx([1e-3 * 10.0 * 10.0, 0.0], abs=1e-12)
+
+
+def test_a_strip_that_is_let_go_of_swings(tmp_path):
+    """A load that stays from the first moment bends the strip to twice the static deflection."""
+    section = PLAIN + "\n*MATERIAL, NAME=M\n*DENSITY\n0.01\n*ELASTIC\n1000., 0."
+    text = STRIP.format(section=section.replace("=PLAIN", "=M"), load=FORCE)
+    explicit = text.replace("*STATIC\n1., 1.", "*DYNAMIC, EXPLICIT\n, 1.")
+    with pytest.raises(DeckError, match="no explicit dynamics"):
+        read(tmp_path, explicit)
+    half = np.pi / (1.8751**2 * np.sqrt(EI / (0.01 * 0.2 * 10.0**4)))  # of the first mode
+    text = text.replace("*STATIC\n1., 1.", f"*DYNAMIC, ALPHA=0., DIRECT\n{half / 20}, {half}")
+    text = text.replace("*NODE PRINT", "*OUTPUT, HISTORY\n*NODE OUTPUT")
+    deck = fx.read_deck(write(tmp_path, text))
+    last = deck.run().rows[-1]
+    deck.scene.close()
+    static = 1e-3 * (10.0**3 / (3.0 * EI) + 10.0 / GA)
+    # the first mode has 97 % of the deflection; that of the others depends on their phase
+    assert last["m[U3 TIP]"] == pytest.approx(2.0 * static, rel=0.06)
+    assert last["balance"] == pytest.approx(0.0, abs=1e-9 * last["external_work"])

@@ -207,7 +207,7 @@ def test_no_set_bonds_everything(caplog: pytest.LogCaptureFixture) -> None:
     scene = scene_of(fx.Debond(interface(bonded=None), STRESS))
     assert "no bonded set given; the whole pair is bonded" in warnings(caplog)
     history = run(scene, fx.Releases(1))
-    assert "'bond' has no crack tip" in warnings(caplog)
+    assert warnings(caplog).count("no crack tip") == 1  # said once
     assert history.reason == "no crack tip is left"
     assert scene.solver.fronts[0].bonded.all()
 

@@ -124,6 +124,11 @@ class Contacts:
             row.fail("the slave surface is missing")
         if any(key(p.slave) == key(slave) and key(p.master) == key(master) for p in self.pairs):
             row.fail("this pair is defined already")
+        if self._flat.kind.shell and card.has("NO THICKNESS"):
+            row.fail(
+                "NO THICKNESS is not available: faces of shells meet, not their reference "
+                "surfaces; give the shells an OFFSET, or leave it out"
+            )
         alone = all(key(p.slave) != key(slave) for p in self.pairs)
         title = slave if alone else f"{slave} on {master}"
         self.pairs.append(PairDef(row, slave, master, title))

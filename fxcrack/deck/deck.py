@@ -127,18 +127,30 @@ def read_deck(
         InputError: The scene it describes contradicts itself.
     """
     found = on_root(comm, lambda: translated(Path(path), order), DeckError)
+    return _made(found, Path(path), comm, say=True)
+
+
+def _made(found: Translated | None, path: Path, comm: MPI.Intracomm, *, say: bool) -> Deck:
+    """The deck of what rank 0 has translated; collective.
+
+    Args:
+        found: On rank 0.
+        path: The deck.
+        comm: Communicator of the scene.
+        say: Whether what is replaced is warned of.
+    """
     raw = None if found is None else found.raw
     shared: tuple[dict[str, Any], list[DeckStep], Report, dict[str, NodeNames]] = comm.bcast(
         None if found is None else (found.arguments, found.steps, found.report, found.nodes)
     )
     arguments, steps, report, nodes = shared
-    mesh = distribute(raw, comm, Path(path).stem)
+    mesh = distribute(raw, comm, path.stem)
     try:
         scene = Scene(mesh, **arguments)
     except InputError as error:
-        raise DeckError(f"{Path(path).name}: {error}") from error
+        raise DeckError(f"{path.name}: {error}") from error
     finally:  # after the scene is made, whose report holds the warnings since then
-        for line in report.replaced:
+        for line in report.replaced if say else ():
             log.warn("%s", line)
     return Deck(scene, steps, report, nodes)
 
@@ -162,21 +174,25 @@ def _translated(path: Path, report: Report, order: int | None = None) -> Transla
         raise DeckError(f"{path.name}: {error}") from error
 
 
-def check_deck(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> Report:
+def check_deck(
+    path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD, *, order: int | None = None
+) -> Report:
     """What reading a deck would do: read, replaced, ignored, refused; collective.
 
     Args:
         path: The deck.
         comm: Communicator.
+        order: As of :func:`read_deck`.
 
     Returns:
         The account, with all cards and elements that are refused by their name, and the first
         thing that is wrong otherwise.
     """
     report = Report(Path(path).name)
+    found = None
     if comm.rank == 0:
         try:
-            _translated(Path(path), report)
+            found = _translated(Path(path), report, order)
         except FxcrackError as error:
             first = str(error).split(" (and ")[0]
             if not any(first == line for line in report.refused):
@@ -184,7 +200,7 @@ def check_deck(path: str | Path, comm: MPI.Intracomm = MPI.COMM_WORLD) -> Report
     report = cast(Report, comm.bcast(report))
     if not report.refused:
         try:
-            read_deck(path, comm).scene.close()
+            _made(found, Path(path), comm, say=False).scene.close()
         except FxcrackError as error:
             report.refused.append(str(error))
     return report

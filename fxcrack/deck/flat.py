@@ -127,6 +127,7 @@ class Flat:
         self.used[self.cells] = True
         self._check_plane()
         self._faces: tuple[Ints, Ints] | None = None
+        self._combining: list[Card] = []
 
     def _check_plane(self) -> None:
         """Refuse plane elements off the plane z = 0."""
@@ -308,6 +309,8 @@ class Flat:
                 f"TYPE={kind} is not available; define surfaces by element faces (TYPE=ELEMENT) or "
                 "nodes (TYPE=NODE), and rigid ones by the faces of a stiff body"
             )
+        if card.has("COMBINE"):
+            return self._combined(place, card)
         parts = []
         for row in card.need_rows("element set, face"):
             side = row.text(1).upper()
@@ -323,11 +326,35 @@ class Flat:
                 row.fail(
                     f"face {side} is not available on {self.kind.name} elements; S1, S2, ... are"
                 )
+        return self._once(card, parts)
+
+    @staticmethod
+    def _once(card: Card, parts: list[Ints]) -> Ints:
+        """Facets of all parts, each once."""
         rows = np.concatenate(parts)
         if not len(rows):
             card.fail("the surface has no face")
         ids = row_ids(np.sort(rows, axis=1))
         return np.asarray(rows[np.sort(np.unique(ids, return_index=True)[1])])
+
+    def _combined(self, place: str, card: Card) -> Ints:
+        """Facets of a surface that is the union of others."""
+        card.choose("COMBINE", ("UNION",), "UNION")
+        if card in self._combining:
+            card.fail("the surface is a part of itself")
+        self._combining.append(card)
+        own = self.placed[place].space.surfaces
+        parts = []
+        for row in card.need_rows("names of surfaces"):
+            for name in (row.text(i) for i, text in enumerate(row.fields) if text):
+                inside = own.get(key(name))
+                parts.append(
+                    self.surface(card, name, row.index)
+                    if inside is None
+                    else self.facets_of(place, inside)
+                )
+        self._combining.remove(card)
+        return self._once(card, parts)
 
     def shell_side(self, card: Card, name: str, index: int | None = None) -> tuple[Ints, str]:
         """Shell elements of a surface, and "top" or "bottom".

@@ -22,7 +22,9 @@ class Gathered:
         points: Positions, shape (n_nodes, gdim), length.
         cells: Nodes of the cells in DOLFINx order, shape (n_cells, n_cell_nodes).
         groups: Of each named group its dimension, and its cells (dimension of the cells), its
-            facets as (cell, local facet) or its nodes.
+            facets as (cell, local facet) or its nodes; of surfaces in space, edges as their nodes.
+        signs: -1 where the order of a cell's nodes does not show its top, of shells,
+            shape (n_cells,).
     """
 
     cell: str
@@ -30,27 +32,38 @@ class Gathered:
     points: Array
     cells: Ints
     groups: dict[str, tuple[int, Ints]]
+    signs: Array
 
 
-def gather(mesh: Mesh) -> Gathered | None:
+def gather(mesh: Mesh, signs: Array | None = None) -> Gathered | None:
     """The whole mesh on rank 0, ``None`` on the others; collective.
 
-    Facets between two cells are left out: they are no surface of a body.
+    Facets between two cells are left out: they are no surface of a body. Nodes that parts of a
+    surface have of their own in a joint are one again.
+
+    Args:
+        mesh: The mesh.
+        signs: Of shells, 1 or -1 per owned cell; 1 by default.
     """
     domain, comm = mesh.domain, mesh.comm
     given = np.asarray(domain.geometry.input_global_indices)
     original = compat.original_cell_index(domain)
     geometry = np.asarray(compat.geometry_dofmap(domain), dtype=np.int64)
     n_owned = domain.topology.index_map(mesh.tdim).size_local
+    signs = np.ones(n_owned) if signs is None else np.asarray(signs)
     parts = comm.gather(
-        (given, domain.geometry.x[:, : mesh.gdim], original[:n_owned], given[geometry[:n_owned]])
+        (
+            *(given, domain.geometry.x[:, : mesh.gdim]),
+            *(original[:n_owned], given[geometry[:n_owned]], signs),
+        )
     )
     groups = {}
     for name in sorted(mesh.groups):
         group = mesh.groups[name]
         found = comm.gather(_members(mesh, group, given, original, geometry))
         if found is not None:
-            groups[name] = (group.dim, np.unique(np.concatenate(found), axis=0))
+            edges = mesh.gdim > mesh.tdim > group.dim
+            groups[name] = (0 if edges else group.dim, np.unique(np.concatenate(found), axis=0))
     if parts is None:
         return None
     # numbers of nodes that were given but used by no cell are closed up
@@ -58,14 +71,32 @@ def gather(mesh: Mesh) -> Gathered | None:
     points = np.zeros((len(used), mesh.gdim))
     n_cells = sum(len(p[2]) for p in parts)
     cells = np.zeros((n_cells, parts[0][3].shape[1]), dtype=np.int64)
-    for numbers, x, which, nodes in parts:
+    same = _joined(used, mesh.joints)
+    top = np.ones(n_cells)
+    for numbers, x, which, nodes, sign in parts:
         points[np.searchsorted(used, numbers)] = x
-        cells[which] = np.searchsorted(used, nodes)
+        cells[which] = same[np.searchsorted(used, nodes)]
+        top[which] = sign
     for name, (dim, rows) in groups.items():
         if rows.ndim == 1 and dim < mesh.tdim:
-            groups[name] = (dim, np.searchsorted(used, rows))
+            groups[name] = (dim, np.unique(same[np.searchsorted(used, rows)]))
     cell = domain.topology.cell_name()
-    return Gathered(cell, mesh.order, points, cells, groups)
+    return Gathered(cell, mesh.order, points, cells, groups, top)
+
+
+def _joined(used: Ints, joints: Ints) -> Ints:
+    """The node that stands for each node, the first of its joint, shape (n_nodes,).
+
+    Args:
+        used: Numbers of the nodes in the input, ascending.
+        joints: Number in the input, and joint, sorted by the latter, shape (n, 2).
+    """
+    same = np.arange(len(used))
+    if len(joints):
+        at = np.searchsorted(used, joints[:, 0])
+        _, first, which = np.unique(joints[:, 1], return_index=True, return_inverse=True)
+        same[at] = at[first][which]
+    return same
 
 
 def _members(mesh: Mesh, group: Group, given: Ints, original: Ints, geometry: Ints) -> Ints:
@@ -90,7 +121,7 @@ def _members(mesh: Mesh, group: Group, given: Ints, original: Ints, geometry: In
         nodes.append(given[geometry[cell][closures[local]]])
         if len(cells) == 1:
             facets.append((original[cell], local))
-    if group.dim == tdim - 1:
+    if group.dim == tdim - 1 and mesh.gdim == tdim:
         return np.array(facets, dtype=np.int64).reshape(-1, 2)
     flat = np.concatenate(nodes) if nodes else np.zeros(0)
     return np.unique(flat.astype(np.int64))

@@ -100,6 +100,10 @@ class Groups:
         """Name of a group of cells."""
         return self._add(name, "cells", words, cells)
 
+    def cells_of(self, name: str) -> Ints:
+        """Cells of a group of cells that has been made."""
+        return self._found[name][1]
+
     def raw_mesh(self) -> RawMesh:
         """The mesh with all groups; nodes that no cell has are dropped.
 

@@ -34,6 +34,8 @@ def interaction(
         meant = did_you_mean(key(name), interactions)
         where.fail(f"there is no surface interaction '{name}'{meant}; define it")
     family = interactions[key(name)]
+    if family.card.number("PAD THICKNESS", 0.0):
+        family.card.fail("PAD THICKNESS is not available; move the surfaces apart instead")
     behavior = family.first("SURFACEBEHAVIOR")
     if behavior is not None and behavior.word("PRESSURE-OVERCLOSURE", "HARD") != "HARD":
         behavior.fail(

@@ -45,7 +45,7 @@ _READ = {
     "NCOPY": ("OLD SET, NEW SET, CHANGE NUMBER, SHIFT, REFLECT, MULTIPLE", ""),
     "ELGEN": ("ELSET", ""),
     "ELCOPY": ("OLD SET, NEW SET, ELEMENT SHIFT, SHIFT NODES", ""),
-    "SURFACE": ("NAME, TYPE", "INTERNAL"),
+    "SURFACE": ("NAME, TYPE, COMBINE", "INTERNAL"),
     "PART": ("NAME", ""),
     "END PART": ("", ""),
     "INSTANCE": ("NAME, PART", ""),
@@ -67,7 +67,7 @@ _READ = {
     "HYPERELASTIC": ("NEO HOOKE", "MODULI"),
     "DAMPING": ("ALPHA, BETA", ""),
     # interfaces
-    "SURFACE INTERACTION": ("NAME", ""),
+    "SURFACE INTERACTION": ("NAME, PAD THICKNESS", "TRACKING THICKNESS"),
     "FRICTION": ("ROUGH", "LAGRANGE, SLIP TOLERANCE, ELASTIC SLIP"),
     "SURFACE BEHAVIOR": ("PRESSURE-OVERCLOSURE", "AUGMENTED LAGRANGE, PENALTY, DIRECT"),
     "COHESIVE BEHAVIOR": ("TYPE, DEPENDENCIES, ELIGIBILITY, REPEATED CONTACTS", ""),
@@ -76,9 +76,9 @@ _READ = {
     "CONTACT PROPERTY ASSIGNMENT": ("", ""),
     "CONTACT FORMULATION": ("TYPE", ""),
     "CONTACT PAIR": (
-        "INTERACTION, TYPE, ADJUST, TIED, SMALL SLIDING",
+        "INTERACTION, TYPE, ADJUST, TIED, SMALL SLIDING, NO THICKNESS",
         "EXTENSION ZONE, SMOOTH, HCRIT, SLIDE DISTANCE, MINIMUM DISTANCE, CPSET, WEIGHT, OP, "
-        "MECHANICAL CONSTRAINT",
+        "MECHANICAL CONSTRAINT, SUPPLEMENTARY CONSTRAINTS, TRACKING",
     ),
     "CLEARANCE": ("SLAVE, MASTER, SECONDARY, MAIN, VALUE, CPSET", ""),
     "CONTACT CLEARANCE": (
@@ -104,7 +104,10 @@ _READ = {
         "",
     ),
     # steps
-    "STEP": ("NAME, NLGEOM, INC, AMPLITUDE", "EXTRAPOLATION, UNSYMM, CONVERT SDI, SOLVER"),
+    "STEP": (
+        "NAME, NLGEOM, INC, AMPLITUDE, PERTURBATION",
+        "EXTRAPOLATION, UNSYMM, CONVERT SDI, SOLVER",
+    ),
     "END STEP": ("", ""),
     "STATIC": ("DIRECT, STABILIZE, ALLSDTOL, FACTOR, RIKS", "CONTINUE"),
     "VISCO": ("DIRECT, CETOL, STABILIZE, ALLSDTOL, FACTOR", "CREEP"),
@@ -121,7 +124,7 @@ _READ = {
     "BOUNDARY": ("AMPLITUDE, OP, TYPE, FIXED", "LOAD CASE, REGION TYPE"),
     "CLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
     "DLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
-    "DSLOAD": ("AMPLITUDE, OP, FOLLOWER", "LOAD CASE, REGION TYPE"),
+    "DSLOAD": ("AMPLITUDE, OP, FOLLOWER, CONSTANT RESULTANT", "LOAD CASE, REGION TYPE"),
     "TEMPERATURE": ("AMPLITUDE, OP", ""),
     "DEBOND": (
         "SLAVE, MASTER, SECONDARY, MAIN, DEBONDING FORCE, TIME INCREMENT, FREQUENCY",
@@ -132,13 +135,14 @@ _READ = {
         "TOLERANCE, UNSTABLE GROWTH TOLERANCE, VISCOSITY",
         "",
     ),
-    "CONTROLS": ("TYPE, PARAMETERS, RESET, ANALYSIS", ""),
+    "CONTROLS": ("TYPE, PARAMETERS, RESET, ANALYSIS", "FIELD"),
+    "RESTART": ("READ", "WRITE, FREQUENCY, NUMBER INTERVAL, TIME MARKS, OVERLAY, SINGLE"),
     "INCLUDE": ("INPUT", ""),
     "PARAMETER": ("", ""),
 }
 
 _OUTPUT = (
-    "HEADING, PREPRINT, PHYSICAL CONSTANTS, OUTPUT, NODE OUTPUT, RESTART, MONITOR, PRINT, "
+    "HEADING, PREPRINT, PHYSICAL CONSTANTS, OUTPUT, NODE OUTPUT, MONITOR, PRINT, "
     "TIME POINTS, FILTER, FILE FORMAT, FILE OUTPUT, ELEMENT OUTPUT, CONTACT OUTPUT, ENERGY "
     "OUTPUT, INCREMENTATION OUTPUT, INTEGRATED OUTPUT, INTEGRATED OUTPUT SECTION, SURFACE "
     "OUTPUT, MODAL OUTPUT, NODE PRINT, NODE FILE, EL PRINT, EL FILE, CONTACT PRINT, CONTACT "
@@ -148,7 +152,13 @@ _OUTPUT = (
 )
 """Headings, output requests, and material data without effect on stresses."""
 
-_NUMERICS = "CONTACT CONTROLS, SECTION CONTROLS, HOURGLASS STIFFNESS, SOLVER CONTROLS"
+_OF_OUTPUT = ("OUTPUT", "PRINT", "FILE")
+"""How keywords end that ask for output, whether they stand in the table or not."""
+
+_NUMERICS = (
+    "CONTACT CONTROLS, CONTACT CONTROLS ASSIGNMENT, CONTACT STABILIZATION, SECTION CONTROLS, "
+    "HOURGLASS STIFFNESS, SOLVER CONTROLS"
+)
 
 _SHELLS = (
     "it is not available; shells (S4R, S8R, SC8R) have *SHELL SECTION with a thickness or plies"
@@ -193,6 +203,7 @@ _REFUSED = {
     "CONTACT INITIALIZATION ASSIGNMENT": _GENERAL,
     "CONTACT INTERFERENCE": "start from surfaces that meet; interference is not available",
     "CHANGE FRICTION": "friction stays what it is; give one coefficient for all steps",
+    "CONTACT DAMPING": "damping between faces is not available; give the bodies *DAMPING",
     "MODEL CHANGE": "parts and contact pairs stay in the model in all steps",
     "GAP": "gap elements are not available; use *CONTACT PAIR",
     "MASS": "point masses are not available; give the bodies their *DENSITY",
@@ -230,6 +241,7 @@ _REFUSED = {
     "SURFACE SECTION": "surface elements are not available; load element faces by *DSLOAD",
     "IMPORT": "give the model in this deck; states of other analyses are not imported",
     "DISTRIBUTION": "give one *SOLID SECTION for each part with properties of its own",
+    "DISTRIBUTION TABLE": "give one *SOLID SECTION for each part with properties of its own",
     "COMPOSITE LAYUP": "give each ply its own elements and *SOLID SECTION",
     "IMPERFECTION": "give the nodes of the imperfect body",
 }
@@ -255,8 +267,21 @@ def _table() -> dict[str, Keyword]:
 KEYWORDS = _table()
 """What is known of each keyword, by its squeezed name."""
 
-TITLES = {_squeezed(name): name for name in [*_READ, *_REFUSED]}
+TITLES = {
+    _squeezed(name): name.strip()
+    for name in [*_READ, *_REFUSED, *_OUTPUT.split(","), *_NUMERICS.split(",")]
+}
 """Keywords as users write them, by their squeezed names."""
+
+
+def keyword_of(name: str) -> Keyword | None:
+    """What is known of a keyword, ``None`` if nothing is.
+
+    Args:
+        name: Squeezed.
+    """
+    found = KEYWORDS.get(name)
+    return Keyword("output") if found is None and name.endswith(_OF_OUTPUT) else found
 
 
 def full_name(keyword: str, parameter: str) -> str:

@@ -175,6 +175,11 @@ class Loads:
             entry.direction = self._direction(row, 3)
             if self._finite and follower == "YES":
                 row.fail("a traction that turns with the body is not available; add FOLLOWER=NO")
+            if self._finite and card.word("CONSTANT RESULTANT", "NO") not in ("", "YES"):
+                self._report.replace(
+                    "the traction is per area of the undeformed surface (CONSTANT RESULTANT=YES)",
+                    card,
+                )
         elif word == "GRAV":
             entry.direction = self._direction(row, 3)
         elif word not in _BODY or _BODY[word] >= self._flat.kind.gdim:
@@ -343,12 +348,16 @@ class Loads:
         if entry.type == "GRAV":
             out: list[Load] = []
             for section, density in densities.items():
+                if entry.name and not np.isin(cells, groups.cells_of(section)).any():
+                    continue
                 if density is None:
                     entry.row.fail(f"gravity needs the *DENSITY of the material of '{section}'")
+                heavy = np.intersect1d(cells, groups.cells_of(section))
                 weight = tuple(value * density * d for d in entry.direction[:gdim])
-                out.append(BodyForce(weight, section, amplitude, title(f"{name} {section}")))
-            if entry.name and len(cells) < len(flat.cells):
-                entry.row.fail("gravity on a part of the model is not available; leave the set out")
+                where = section
+                if len(heavy) < len(groups.cells_of(section)):
+                    where = groups.cells(f"{name} {section}", heavy)
+                out.append(BodyForce(weight, where, amplitude, title(f"{name} {section}")))
             return out
         force = np.zeros(gdim)
         force[_BODY[entry.type]] = value

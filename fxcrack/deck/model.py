@@ -100,6 +100,7 @@ class _Walk:
         self._space = self._model.root
         self._family: Family | None = None
         self._step: Family | None = None
+        self._early: list[tuple[Space, Card]] = []
 
     def run(self, cards: list[Card]) -> Model:
         for card in cards:
@@ -111,9 +112,58 @@ class _Walk:
                     raise
         if self._step is not None:
             self._step.card.fail("the step has no *END STEP; the deck may be cut off")
+        self._resolve_early()
         if self._space is not self._model.root:
             cards[-1].fail(f"the part or instance '{self._space.name}' never ends")
         return self._model
+
+    def _resolve_early(self) -> None:
+        """Make the sets of the present space that name sets defined after them.
+
+        Raises:
+            DeckError: A set that they name does not exist.
+        """
+        waiting = [card for space, card in self._early if space is self._space]
+        while waiting:
+            self._early = [(space, c) for space, c in self._early if space is not self._space]
+            for card in waiting:
+                _PLACES[card.keyword](self, card)
+            still = [card for space, card in self._early if space is self._space]
+            if len(still) == len(waiting):
+                made = {key(card.text(card.keyword)) for card in still}
+                lost = [c for c in still if key(self._unknown(c)) not in made]
+                card = (lost or still)[0]
+                name, of_elements = self._unknown(card), self._of_elements(card)
+                sets = self._space.elsets if of_elements else self._space.nsets
+                what = "element set" if of_elements else "node set"
+                card.fail(f"there is no {what} '{name}'{did_you_mean(key(name), sets)}; define it")
+            waiting = still
+
+    @staticmethod
+    def _of_elements(card: Card) -> bool:
+        """Whether a card that makes a set names sets of elements."""
+        return card.keyword == "ELSET" or card.has("ELSET")
+
+    def _unknown(self, card: Card) -> str:
+        """The first set named by a card that makes a set and not defined yet, empty without."""
+        if card.keyword == "NSET" and card.has("ELSET"):
+            name = card.text("ELSET")
+            return "" if key(name) in self._space.elsets else name
+        if card.has("GENERATE") or not any(c.isalpha() or c == '"' for c in "".join(card.lines)):
+            return ""
+        place = key(card.text("INSTANCE")) if card.has("INSTANCE") else ""
+        space = self._model.instances.get(place, self._space)
+        kind = "elsets" if self._of_elements(card) else "nsets"
+        for row in card.rows():
+            for i, text in enumerate(row.fields):
+                if not text or text.isdigit() or to_float(key(row.text(i))) is not None:
+                    continue
+                first, _, rest = key(row.text(i)).rpartition(".")
+                inside = self._model.instances.get(first)
+                known = inside is not None and (rest.isdigit() or rest in getattr(inside, kind))
+                if not known and key(row.text(i)) not in getattr(space, kind):
+                    return row.text(i)
+        return ""
 
     def _take(self, card: Card) -> None:
         word = card.keyword
@@ -171,6 +221,7 @@ class _Walk:
     def _end_space(self, card: Card) -> None:
         if self._space is self._model.root:
             card.fail("it ends nothing; its beginning is missing")
+        self._resolve_early()
         self._space = self._model.root
 
     def _nothing(self, card: Card) -> None:
@@ -229,18 +280,21 @@ class _Walk:
     # -- sets and surfaces ---------------------------------------------------------------
 
     def _nset(self, card: Card) -> None:
-        if card.has("ELSET"):
+        if self._unknown(card):
+            self._early.append((self._space, card))
+        elif card.has("ELSET"):
             self._nodes_of_elements(card)
         else:
             self._set(card, "nsets", card.text("NSET"))
 
     def _elset(self, card: Card) -> None:
-        self._set(card, "elsets", card.text("ELSET"))
+        if self._unknown(card):
+            self._early.append((self._space, card))
+        else:
+            self._set(card, "elsets", card.text("ELSET"))
 
     def _nodes_of_elements(self, card: Card) -> None:
         name, elset = card.text("NSET"), card.text("ELSET")
-        if key(elset) not in self._space.elsets:
-            card.fail(f"there is no element set '{elset}' yet; define it before this card")
         for place, labels in self._space.elsets[key(elset)].members.items():
             space = self._model.instances[place] if place else self._space
             for block in space.elements.values():

@@ -97,6 +97,11 @@ def read_procedures(steps: Sequence[Family], report: Report) -> list[Procedure]:
     out: list[Procedure] = []
     controls, time, finite = _Controls(), 0.0, False
     for family in steps:
+        if family.card.has("PERTURBATION"):
+            family.card.fail(
+                "PERTURBATION, a linear step about the state before, is not available; without it "
+                "a *STATIC step with NLGEOM=NO is linear but for contact"
+            )
         finite = _nlgeom(family.card, finite)
         for card in family.cards:
             if card.keyword == "CONTROLS":

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, DeckError
-from fxcrack.deck.keywords import KEYWORDS, TITLES
+from fxcrack.deck.keywords import KEYWORDS, TITLES, keyword_of
 
 
 @dataclass
@@ -36,7 +36,7 @@ class Report:
     def screen(self, cards: list[Card]) -> None:
         """Note every card that is ignored, left out or refused because of its words alone."""
         for card in cards:
-            known = KEYWORDS.get(card.keyword)
+            known = keyword_of(card.keyword)
             if known is None:
                 near = did_you_mean(card.keyword, KEYWORDS)
                 if near:
@@ -46,6 +46,13 @@ class Report:
                     f"{card.place}: {card.title} is not known to fxcrack{near}; if it only asks "
                     "for output, take it out of the deck"
                 )
+            elif card.keyword == "RESTART":
+                if card.has("READ"):
+                    self.refused.append(
+                        f"{card.place}: {card.title}, READ is refused: states of other analyses "
+                        "are not read; give the whole analysis in this deck"
+                    )
+                self.ignored[card.title] = self.ignored.get(card.title, 0) + 1
             elif known.kind == "output":
                 self.ignored[card.title] = self.ignored.get(card.title, 0) + 1
             elif known.kind == "numerics":

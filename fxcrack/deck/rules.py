@@ -14,7 +14,7 @@ from fxcrack.deck.model import Model
 from fxcrack.deck.procedures import Procedure
 from fxcrack.deck.properties import Sections
 from fxcrack.deck.supports import AnySupport, Boundary
-from fxcrack.deck.thermal import Temperatures
+from fxcrack.steps.explicit import Explicit
 
 
 def density_of(material: Material | Section) -> float | None:
@@ -24,22 +24,18 @@ def density_of(material: Material | Section) -> float | None:
     return density
 
 
-def check_shells(procedures: Sequence[Procedure], loads: Loads, temperatures: Temperatures) -> None:
+def check_shells(procedures: Sequence[Procedure], loads: Loads) -> None:
     """Refuse what shells on surfaces do not have.
 
     Raises:
         DeckError: Says which, and what to do instead.
     """
     for procedure in procedures:
-        if procedure.inertia is not None:
+        if isinstance(procedure.step, Explicit):
             procedure.card.fail(
-                "shells on surfaces have no inertia here; take continuum shells (SC8R), solids, or "
-                "*STATIC"
+                "shells on surfaces have no explicit dynamics here; take continuum shells (SC8R), "
+                "solids, or implicit *DYNAMIC"
             )
-    if temperatures.first is not None:
-        temperatures.first.fail(
-            "shells on surfaces have no temperature here; take continuum shells (SC8R) or solids"
-        )
     entry = loads.following
     if entry is not None:
         entry.row.fail(

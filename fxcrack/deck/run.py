@@ -19,13 +19,18 @@ from fxcrack.output.usual_names import with_usual_names
 from fxcrack.steps.cycles import Cycles
 
 
-def check_only(path: Path, console: Console) -> None:
+def check_only(path: Path, console: Console, *, order: int | None = None) -> None:
     """Print what reading a deck would do; collective.
+
+    Args:
+        path: The deck.
+        console: Where rank 0 prints.
+        order: Order of the displacement; that of the elements by default.
 
     Raises:
         DeckError: Something is refused.
     """
-    report = check_deck(path)
+    report = check_deck(path, order=order)
     console.print(str(report), markup=False, soft_wrap=True)
     if report.refused:
         raise DeckError(f"'{path}': {len(report.refused)} entries are refused; see the list above")

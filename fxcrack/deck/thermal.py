@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.temperature import Spatial, Temperature
-from fxcrack.deck.cards import Card, DeckError
+from fxcrack.deck.cards import Card, DeckError, Row
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.report import Report
 from fxcrack.deck.tracks import Amplitudes, Curve, Period
@@ -66,7 +66,7 @@ class Temperatures:
             self._given, self._first = True, self._first or card
             for row in card.need_rows("node or set, temperature"):
                 nodes = self._flat.nodes(card, row.text(0), row.index)
-                self._initial[nodes] = row.number(1)
+                self._initial[nodes] = self._uniform(row)
         self._fields = [(0.0, self._initial.copy())]
 
     def take(self, cards: Sequence[Card], amplitudes: Amplitudes, period: Period) -> None:
@@ -87,7 +87,7 @@ class Temperatures:
                 curves.append(curve)
             for row in card.need_rows("node or set, temperature"):
                 nodes = self._flat.nodes(card, row.text(0), row.index)
-                wanted[nodes] = row.number(1)
+                wanted[nodes] = self._uniform(row)
         if len(curves) > 1 or (curves and any(not c.has("AMPLITUDE") for c in cards)):
             cards[0].fail("temperatures of one step with several amplitudes are not available")
         if curves:
@@ -102,6 +102,15 @@ class Temperatures:
             self._fields += [(soon, wanted), (period.end, wanted)]
         else:
             self._fields.append((period.end, wanted))
+
+    def _uniform(self, row: Row) -> float:
+        """The temperature of a line, the same over the thickness of a shell."""
+        if self._flat.kind.shell and any(row.number(i, 0.0) for i in range(2, len(row))):
+            row.fail(
+                "a temperature that varies over the thickness is not available from a deck; give "
+                "one value, or Temperature with a gradient in Python"
+            )
+        return row.number(1)
 
     def effect(self, zero: float | None) -> list[Temperature]:
         """The effect of the scene: one, or none where the deck has no temperature.

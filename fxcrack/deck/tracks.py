@@ -1,24 +1,24 @@
 """What a load or a prescribed displacement does in time: amplitudes of decks and their tracks.
 
-A deck says for each step where a value goes; over the steps that makes one piecewise linear track
-of total time, and an amplitude of the scene.
+A deck says for each step where a value goes; over the steps that makes one track of total time,
+piecewise linear or of smooth steps, and an amplitude of the scene.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fxcrack.base.arrays import Array
-from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, Ramp
+from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, Ramp, SmoothStep
 from fxcrack.deck.cards import Card, key
 from fxcrack.deck.model import Model
 from fxcrack.deck.report import Report
 
 _SMOOTH = 32
-"""Straight pieces of one smooth step."""
+"""Straight pieces of a smooth step that ends within its rise, and of a parabola."""
 _PER_PERIOD = 64
 """Straight pieces of one period of the highest harmonic."""
 _JUMP = 1e-6
@@ -46,25 +46,59 @@ class Period:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """An amplitude of a deck, piecewise linear.
+    """An amplitude of a deck, piecewise linear or of smooth steps.
 
     Attributes:
         times: Increasing, shape (n,).
         values: Shape (n,).
         total: Whether the times are total times; else they begin with the step.
         absolute: Whether the values are those of the load itself, whatever its reference value.
+        smooth: Whether it goes from value to value by smooth steps.
+        cut: Called where straight lines must take the place of a smooth step.
     """
 
     times: Array
     values: Array
     total: bool = False
     absolute: bool = False
+    smooth: bool = False
+    cut: Callable[[], None] | None = None
+
+    def start(self, period: Period) -> float:
+        """Total time at which its own time is 0, for a step."""
+        return 0.0 if self.total else period.start
 
     def over(self, period: Period) -> tuple[Array, Array]:
-        """Total times and values over a step, its beginning and end included."""
-        times = self.times if self.total else self.times + period.start
+        """Total times and values over a step, its beginning and end included.
+
+        Between them the value is linear; a smooth step is followed by chords.
+        """
+        times = self.times + self.start(period)
+        if self.smooth:
+            step = SmoothStep(tuple(times.tolist()), tuple(self.values.tolist()))
+            inner = np.unique(step.breaks())
+            inner = inner[(inner > period.start) & (inner < period.end)]
+            knots = np.array([period.start, *inner, period.end])
+            return knots, np.array([step(t) for t in knots])
         inner = times[(times > period.start) & (times < period.end)]
         knots = np.array([period.start, *inner, period.end])
+        return knots, np.interp(knots, times, self.values)
+
+    def corners(self, period: Period) -> tuple[Array, Array] | None:
+        """Total times and values over a step between which it makes whole smooth steps.
+
+        None where it does not: it is piecewise linear, or a rise begins or ends outside the step.
+        """
+        if not self.smooth:
+            return None
+        times = self.times + self.start(period)
+        inside = (times > period.start) & (times < period.end)
+        for edge in (period.start, period.end):
+            i = int(np.searchsorted(times, edge))
+            between = 0 < i < len(times) and times[i] != edge
+            if between and self.values[i] != self.values[i - 1]:
+                return None
+        knots = np.array([period.start, *times[inside], period.end])
         return knots, np.interp(knots, times, self.values)
 
 
@@ -116,12 +150,17 @@ class Amplitudes:
             times = np.asarray(begin + step * np.arange(len(values)), dtype=np.float64)
         else:
             times, values = self._pairs(card)
-        if kind == "SMOOTH STEP":
+        if kind != "SMOOTH STEP":
+            return Curve(times, values, total, absolute)
+
+        def cut() -> None:
             self._report.replace(
-                f"the smooth step is followed by {_SMOOTH} straight lines between two points", card
+                "a smooth step that begins or ends within another step, or beside loads of other "
+                f"kinds, is followed by {_SMOOTH} straight lines",
+                card,
             )
-            times, values = _smooth(times, values)
-        return Curve(times, values, total, absolute)
+
+        return Curve(times, values, total, absolute, smooth=True, cut=cut)
 
     def _pairs(self, card: Card) -> tuple[Array, Array]:
         flat = [x for row in card.rows() for x in row.numbers()]
@@ -154,39 +193,37 @@ class Amplitudes:
         return times, values
 
 
-def _smooth(times: Array, values: Array) -> tuple[Array, Array]:
-    """Points of the fifth-order steps between the pairs."""
-    s = np.linspace(0.0, 1.0, _SMOOTH + 1)[:-1]
-    shape = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
-    t = times[:-1, None] + np.diff(times)[:, None] * s
-    v = values[:-1, None] + np.diff(values)[:, None] * shape
-    return np.append(t.ravel(), times[-1]), np.append(v.ravel(), values[-1])
-
-
 @dataclass
 class Track:
-    """A value over total time, piecewise linear.
+    """A value over total time.
 
     Attributes:
         times: Times, increasing from 0.
-        values: Values at them.
+        values: Values at them; between them it is linear, or on a smooth step of which they are
+            points.
     """
 
     times: list[float] = field(default_factory=lambda: [0.0])
     values: list[float] = field(default_factory=lambda: [0.0])
     _made_of: list[tuple[float, Curve] | None] = field(default_factory=list)
+    _corners: list[tuple[float, float]] | None = field(default_factory=lambda: [(0.0, 0.0)])
+    _smooth: list[Curve] = field(default_factory=list)
 
     def move(self, period: Period, value: float, curve: Curve | None) -> None:
         """Go over a step to a reference value, along a curve if there is one."""
         whole = curve is not None and curve.total and not curve.absolute
         self._made_of.append((value, curve) if whole and curve is not None else None)
+        before = self.values[-1]
         if curve is not None:
             times, values = curve.over(period)
             self._put(times, values if curve.absolute else value * values, period)
+            self._turn(curve, 1.0 if curve.absolute else value, period)
         elif period.ramp:
             self._append(period.end, value)
+            self._stay(before, period)
         else:
             self._put(np.array([period.start, period.end]), np.array([value, value]), period)
+            self._stay(before, period)
 
     def move_at_rate(self, period: Period, rate: float, curve: Curve | None) -> None:
         """Go over a step at a rate, constant or along a curve: the value is its integral.
@@ -199,6 +236,7 @@ class Track:
             rates = rates if curve.absolute else rate * rates
         self._made_of.append(None)
         here = self.values[-1]
+        self._corners = None
         for i in range(len(times) - 1):
             length, change = times[i + 1] - times[i], rates[i + 1] - rates[i]
             n = _SMOOTH if change else 1
@@ -211,6 +249,38 @@ class Track:
         """Stay over a step as it was at its beginning."""
         self._made_of.append(None)
         self._append(period.end, self.values[-1])
+        self._stay(self.values[-1], period)
+
+    def scaled(self, factor: float) -> Track:
+        """The track times a factor."""
+        corners = None if self._corners is None else [(t, factor * v) for t, v in self._corners]
+        made = [None if m is None else (factor * m[0], m[1]) for m in self._made_of]
+        values = [factor * v for v in self.values]
+        return Track(list(self.times), values, made, corners, list(self._smooth))
+
+    def _stay(self, before: float, period: Period) -> None:
+        """After a step without an amplitude: corners of smooth steps are left where it moved."""
+        if self.values[-1] != before:
+            self._corners = None
+        elif self._corners is not None:
+            self._corners.append((period.end, before))
+
+    def _turn(self, curve: Curve, factor: float, period: Period) -> None:
+        """After a step along an amplitude: its corners, where it makes whole smooth steps."""
+        if curve.smooth:
+            self._smooth.append(curve)
+        found = curve.corners(period)
+        if found is None or self._corners is None:
+            self._corners = None
+            return
+        times, values = found[0], factor * found[1]
+        last = self._corners[-1][1]
+        if period.start == 0.0 and not period.moving:
+            self._corners[-1] = (0.0, float(values[0]))
+        elif abs(values[0] - last) > _SAME * max(abs(values[0]), abs(last)):
+            self._corners = None
+            return
+        self._corners += zip(times[1:].tolist(), values[1:].tolist(), strict=True)
 
     def _put(self, times: Array, values: Array, period: Period) -> None:
         first = float(values[0])
@@ -246,14 +316,22 @@ class Track:
         A track that grows in proportion to time is a :class:`Ramp`. One that follows the same
         amplitude of total time in all steps keeps its reference value; of others it is 1.
         """
+        if self._smooth and self._corners is not None:
+            times, values = zip(*self._corners, strict=True)
+            return 1.0, SmoothStep(times, values)
         first = self._made_of[0] if self._made_of else None
         starts = first is None or self.values[0] == first[0] * first[1].values[0]
         if first is not None and starts and all(made == first for made in self._made_of):
             value, curve = first
             times, values = tuple(curve.times.tolist()), tuple(curve.values.tolist())
+            if curve.smooth:
+                return value, SmoothStep(times, values)
             if times == values and times[0] == 0.0:
                 return value, Ramp()
             return value, Amplitude(times, values)
+        for curve in self._smooth:
+            if curve.cut is not None:
+                curve.cut()
         end, last = self.times[-1], self.values[-1]
         straight = [last * (t / end) for t in self.times]
         scale = _SAME * max(abs(v) for v in self.values)
@@ -264,6 +342,8 @@ class Track:
 
 def combined(tracks: Sequence[Track], factors: Sequence[float]) -> Track:
     """Sum of tracks times factors."""
+    if len(tracks) == 1:
+        return tracks[0].scaled(factors[0])
     times = np.unique(np.concatenate([t.times for t in tracks]))
     total = np.zeros(len(times))
     for track, factor in zip(tracks, factors, strict=True):

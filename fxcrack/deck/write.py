@@ -20,6 +20,7 @@ from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
 from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
+from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.inertia import Inertia
@@ -35,6 +36,8 @@ from fxcrack.continuum.loads import (
     Pressure,
     Traction,
 )
+from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
+from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import Temperature
 from fxcrack.criteria import (
     AmplitudeRelease,
@@ -51,11 +54,11 @@ from fxcrack.deck.write_constraints import coupling_lines, equation_lines
 from fxcrack.deck.write_explicit import explicit_interface
 from fxcrack.deck.write_mesh import MeshLines
 from fxcrack.deck.write_properties import criterion_lines, material_lines
+from fxcrack.deck.write_shells import section_lines
 from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.pair import Pair
-from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.supports import AnySupport
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
@@ -84,7 +87,7 @@ def write_deck(
     """
     check_instance("write_deck", "scene", scene, Scene, "deck.scene")
     steps = check_list("write_deck", "steps", steps, (Static, Cycles, Explicit, DeckStep))
-    mesh = gather(scene.mesh)
+    mesh = gather(scene.mesh, getattr(scene.continuum, "signs", None))
     toughness = [_nodal_toughness(d, p) for d, p in zip(scene.debonds, scene.pairs, strict=False)]
     comm, lines, problem = scene.mesh.comm, [], None
     try:
@@ -148,7 +151,12 @@ class _Writer:
                 refuse(f"the effect {type(effect).__name__}")
             if isinstance(effect, Inertia):
                 self.inertia = effect
-        model = [*self._body.lines(), *self._properties(), *self._interfaces(), *self._velocity()]
+        model = [
+            *self._body.lines(explicit=self.explicit),
+            *self._properties(),
+            *self._interfaces(),
+            *self._velocity(),
+        ]
         conditions = [*self._supports(), *self._loads()]
         tail: list[str] = []
         start = 0.0
@@ -171,6 +179,9 @@ class _Writer:
             items = list(materials.items())
         for i, (name, material) in enumerate(items):
             title = f"MATERIAL {i + 1}"
+            if isinstance(material, Section | ContinuumShell):
+                out += section_lines(name, title, material, self.inertia, self._normals(name))
+                continue
             lines, orientation = material_lines(title, material, self.inertia)  # type: ignore[arg-type]
             section = f'*SOLID SECTION, ELSET="{name}", MATERIAL="{title}"'
             out += lines
@@ -179,6 +190,12 @@ class _Writer:
                 section += f', ORIENTATION="{title}"'
             out += [section, number(thickness) if thickness else ","]
         return out
+
+    def _normals(self, group: str) -> Array:
+        """Normals of the cells of a group; the others than rank 0 have none."""
+        if self.mesh is None or group not in self.mesh.groups:
+            return self._body.normals
+        return self._body.normals[self.mesh.groups[group][1]]
 
     def _velocity(self) -> list[str]:
         """Velocity of the nodes at the beginning."""
@@ -232,11 +249,9 @@ class _Writer:
         slave, master = title, f"{title} master"
         out: list[str] = []
         if self.mesh is not None:
-            for name, group in (
-                (slave, _group(pair.sides[0])), (master, _group(pair.sides[1]))
-            ):  # fmt: skip
-                if name != group:
-                    out += self._body.surface(name, self.mesh.groups[group][1])
+            for name, face in ((slave, pair.sides[0]), (master, pair.sides[1])):
+                assert isinstance(face, str | Face)  # rigid ones are refused above
+                out += self._surface(name, face)
         if not debonds and not interface.contact and pair.bonded[pair.paired].all():
             return [*out, f'*TIE, NAME="{title}"{_type(interface)}', f'"{slave}", "{master}"']
         if not interface.contact:
@@ -289,13 +304,29 @@ class _Writer:
     def _thickness(self) -> float:
         return float(getattr(self.scene.input.model, "thickness", 0.0))
 
+    def _surface(self, name: str, where: str | Face) -> list[str]:
+        """A surface of a name; none where the deck has it already."""
+        if isinstance(where, Face):
+            return self._body.side(name, where)
+        if name == where or self.mesh is None:
+            return []
+        dim, members = self.mesh.groups[where]
+        if members.ndim == 1 or dim != self.scene.mesh.tdim - 1:
+            refuse(f"'{name}' on the edges '{where}' of shells")
+        return self._body.surface(name, members)
+
     def _slave_numbers(self, pair: Pair, chosen: Bools) -> Ints:
         """Nodes of the input at some slave nodes, in their order."""
         if self.mesh is None:
             return np.zeros(0, dtype=np.int64)
-        nodes = self._body.facet_nodes(self.mesh.groups[_group(pair.sides[0])][1])
+        face = pair.sides[0]
+        if isinstance(face, Face):
+            nodes, points = self._body.side_points(face)
+        else:
+            nodes = self._body.facet_nodes(self.mesh.groups[face][1])
+            points = self.mesh.points[nodes]
         gdim = self.mesh.points.shape[1]
-        _, at = cKDTree(self.mesh.points[nodes]).query(pair.surface.x[chosen][:, :gdim])
+        _, at = cKDTree(points).query(pair.surface.x[chosen][:, :gdim])
         return np.asarray(nodes[at])
 
     # -- conditions ----------------------------------------------------------------------
@@ -359,7 +390,11 @@ class _Writer:
         return boundary
 
     def _support(self, support: AnySupport) -> list[str]:
-        if not isinstance(support, Displacement):
+        if isinstance(support, Clamp):
+            return ["*BOUNDARY", f'"{support.title}", ENCASTRE']
+        if isinstance(support, Symmetry):
+            return ["*BOUNDARY", f'"{support.title}", {support.axis.upper()}SYMM']
+        if not isinstance(support, Displacement | Rotation):
             refuse(f"the support {type(support).__name__}('{support.title}')")
         held, moved = [], []
         for i, value in enumerate((support.x, support.y, support.z)):
@@ -367,7 +402,8 @@ class _Writer:
                 continue
             if callable(value):
                 refuse(f"support '{support.title}' as a function of position")
-            line = f'"{support.title}", {i + 1}, {i + 1}'
+            dof = i + (4 if isinstance(support, Rotation) else 1)
+            line = f'"{support.title}", {dof}, {dof}'
             if value == 0.0:
                 held.append(line)
             else:
@@ -385,7 +421,7 @@ class _Writer:
         return out
 
     def _load(self, load: Load) -> list[str]:
-        if isinstance(load, Moment | PointMoment):
+        if isinstance(load, Moment) or (isinstance(load, PointMoment) and not self._body.shell):
             refuse(f"the load {type(load).__name__}('{load.title}')")
         if isinstance(load, Pressure) and load.follows_crack:
             # it names an interface, which is no group of the mesh
@@ -396,12 +432,15 @@ class _Writer:
         if any(callable(v) for v in values):
             refuse(f"load '{title}' as a function of position")
         numbers = [float(v) for v in values]  # type: ignore[arg-type]
-        if isinstance(load, PointForce):
+        if isinstance(load, PointForce | PointMoment):
+            if not self._body.whole(load.where):
+                refuse(f"load '{title}' on nodes that the elements of a deck do not have")
+            first = 4 if isinstance(load, PointMoment) else 1
             n = max(len(self._body.nodes_of(load.where)), 1)
             self._name_nodes(title, load.where)
             return [
                 f'*CLOAD, AMPLITUDE="{name}"',
-                *(f'"{title}", {i + 1}, {number(v / n)}' for i, v in enumerate(numbers) if v),
+                *(f'"{title}", {i + first}, {number(v / n)}' for i, v in enumerate(numbers) if v),
             ]
         if isinstance(load, BodyForce):
             if load.where is not None and self.mesh is None:
@@ -409,11 +448,13 @@ class _Writer:
             words = [f"{f'{chr(34)}{load.where}{chr(34)}' if load.where else ''}, B{'XYZ'[i]}, "
                      f"{number(v)}" for i, v in enumerate(numbers) if v]  # fmt: skip
             return [f'*DLOAD, AMPLITUDE="{name}"', *words]
-        if title != load.where and self.mesh is not None:
-            self.sets += self._body.surface(title, self.mesh.groups[_group(load.where)][1])
+        self.sets += self._surface(title, load.where)
         if isinstance(load, Pressure):
             finite = any(isinstance(e, FiniteStrain) for e in self.scene.input.effects)
-            if load.follows != finite:
+            if self._body.shell and not load.follows:
+                card = f'*DSLOAD, AMPLITUDE="{name}", FOLLOWER=NO'
+                return [card, f'"{title}", P, {number(numbers[0])}']
+            if load.follows != finite or self._body.shell:
                 refuse(
                     f"pressure '{title}' with follows={load.follows} and "
                     f"{'' if finite else 'no '}FiniteStrain: in a deck pressures follow if, and "
@@ -484,13 +525,6 @@ def _type(interface: Interface) -> str:
     """Parameter of a pair that says how nodes follow the master, where the scene does."""
     words = {"node-to-surface": "NODE TO SURFACE", "surface-to-surface": "SURFACE TO SURFACE"}
     return "" if interface.pairing is None else f", TYPE={words[interface.pairing]}"
-
-
-def _group(face: str | Face | RigidSurface) -> str:
-    """Name of the group of facets of a side of an interface."""
-    if isinstance(face, str):
-        return face
-    refuse("the face of a shell" if isinstance(face, Face) else "a rigid surface")
 
 
 def _as_deck_step(scene: Scene, step: Static | Cycles | Explicit, i: int) -> DeckStep:
