@@ -17,6 +17,7 @@ from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d, half_dcb
 from fxcrack.meshes.penny import penny
+from fxcrack.meshes.sheets import Sheet, sheets
 from fxcrack.meshes.spacing import growing
 from fxcrack.output.fields import displacement_function
 from fxcrack.output.interface_fields import interface_fields
@@ -253,6 +254,43 @@ def test_without_symmetry_the_energy_is_that_of_the_half(comm: MPI.Intracomm) ->
     assert found["R[pin_top.y]"] == pytest.approx(known["R[pin_top.y]"], rel=SAME)
     assert 2.0 * found["GI[bond]"] == pytest.approx(known["GI[bond]"], rel=SAME)
     assert found["released_energy"] == pytest.approx(known["released_energy"], rel=SAME, abs=SAME)
+
+
+@pytest.mark.mpi
+@pytest.mark.quick("False")
+@pytest.mark.parametrize("finite", [False, True])
+def test_half_of_a_dcb_of_shells(comm: MPI.Intracomm, finite: bool) -> None:
+    found = []
+    x, y = np.linspace(0.0, 20.0, 11), np.linspace(0.0, 4.0, 3)
+    for half in (True, False):
+        arms = [Sheet("upper", x, y, lambda a, b: (a, b, 0.75 + 0.0 * a))]
+        supports = [fx.Displacement("upper_a0", x=0.0, y=0.0, z=1.0)]
+        if not half:
+            arms.append(Sheet("lower", x, y, lambda a, b: (a, b, -0.75 + 0.0 * a)))
+            supports.append(fx.Displacement("lower_a0", x=0.0, y=0.0, z=-1.0))
+        bond = fx.Interface(
+            slave=fx.Face("upper", "bottom"),
+            master=fx.RigidPlane((0.0, 0.0, 0.0), (0.0, 0.0, 1.0))
+            if half
+            else fx.Face("lower", "top"),
+            bonded=lambda x: x[0] >= 10.0 - 1e-6,
+            symmetry=half,
+            name="bond",
+        )
+        scene = fx.Scene(
+            sheets(arms, comm, name="arms"),
+            materials=fx.Section(STEEL, thickness=1.5),
+            model=fx.Shell(),
+            supports=supports,
+            debonds=[fx.Debond(bond, fx.VCCT(GIc=0.2), fx.ProgressiveRelease())],
+            effects=[fx.FiniteStrain()] if finite else [],
+        )
+        found.append(scene.run(fx.Static(until=fx.CrackLength(bond, 12.0))))
+    a, b = found
+    assert [row["event"] for row in a] == [row["event"] for row in b]
+    for name in ("time", "R[upper_a0.z]", "GI[bond]"):
+        scale = np.abs(b[name]).max()
+        assert a[name] == pytest.approx(b[name], rel=SAME, abs=SAME * scale), name
 
 
 def pulled(comm: MPI.Intracomm, *planes: str, left: float, contact: bool = False) -> fx.Scene:

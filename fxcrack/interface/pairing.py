@@ -288,7 +288,7 @@ def _on_rigid(
     if tolerance is None:
         tolerance = 0.1 * slave.facet_size
     paired, normals, gap = find_partners(master, slave, bonded, tolerance, where, continuum)
-    n = slave.n_nodes
+    n, maps = slave.n_nodes, slave.point_maps
     pair = Pair(
         interface=interface,
         surface=slave,
@@ -299,6 +299,7 @@ def _on_rigid(
         gap=gap if interface.gap == "keep" else np.zeros(n),
         bonded=bonded,
         friction=friction_of(interface, slave),
+        master_maps=None if maps is None else np.zeros((n, 0, *maps.shape[1:])),
         rigid=master,
     )
     return _with_partners(pair, np.zeros(n, dtype=bool), cracks=cracks)
