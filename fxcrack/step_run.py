@@ -20,7 +20,7 @@ from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.set_motions import warn_of_turns
-from fxcrack.interface.supports import tell_of_held_bonds
+from fxcrack.interface.supported_slaves import tell_of_held_bonds
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.explicit import ExplicitSolver

@@ -121,7 +121,9 @@ class InterfaceSolver(ABC):
         self.system = ContactSystem(np.zeros((n, n)), 0, n, len(loads))
         self.state = Equilibrium(np.zeros(n), np.zeros(0), np.zeros(0), np.zeros(n))
         self._reach = [np.inf] * len(pairs)
-        self._cost: CostModel | ColumnCost = CostModel.guess(continuum.n_global, gdim)
+        self._cost: CostModel | ColumnCost = CostModel.guess(
+            continuum.n_global, continuum.mesh.gdim
+        )
         self._followed: list[Ints] = []
         self._resumed: InterfaceState | None = None
         self._roles: Roles = []
