@@ -253,6 +253,22 @@ class LinearSolver(InterfaceSolver):
         """Return to an earlier state on the same retained jumps."""
         self.restore_interfaces(saved)
 
+    def undo(self, saved: InterfaceState, rebases: int) -> None:
+        """Return to an earlier state of the interfaces, be the retained jumps others since.
+
+        Collective.
+
+        Args:
+            saved: The state.
+            rebases: Value of :attr:`rebases` then.
+        """
+        if self.rebases == rebases:
+            self.restore_interfaces(saved)
+            return
+        saved.restore_bonds(self.fronts)
+        self._retain(saved)
+        self.rebases += 1
+
     # -- energies and fields -------------------------------------------------------------
 
     def along(self, here: Equilibrium, point: Equilibrium) -> tuple[float, float, Array]:
