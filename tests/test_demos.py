@@ -19,6 +19,7 @@ from fxcrack.demos import (
     effects_cost,
     enf,
     enhanced_dcb,
+    fatigue_front,
     friction_enf,
     front3d,
     large_dcb,
@@ -160,6 +161,17 @@ def test_two_cracks_grow_in_turn():
     released = [g.n_released for g in scene.cracks]
     assert min(released) > 0
     assert balanced(scene.history)
+
+
+@pytest.mark.slow
+def test_fatigue_front_bows_out_in_part_and_arrests_by_node():
+    smooth = fatigue_front.run(True, dy=2.0, lengths=(11.0, 12.0))
+    np.testing.assert_allclose(smooth.x[-1], smooth.x[-1][::-1], atol=1e-5)
+    assert 0.4 < np.ptp(smooth.x[-1]) < 1.2  # as the front of static growth has it
+    assert balanced(smooth.history)
+    jumping = fatigue_front.run(False, dy=1.0, lengths=(11.0, 12.0))
+    assert jumping.history.reason.startswith("arrest")
+    assert float(jumping.history.rows[-1]["N"]) > float(smooth.history.rows[-1]["N"])
 
 
 def test_moment_dcb_is_straight():
