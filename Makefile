@@ -30,6 +30,12 @@ lint: $(ready) ## style, format, types
 docs: $(ready) ## the documentation, in out/docs; warnings are errors
 	.venv/bin/python -m sphinx -qW --keep-going -d out/docs-cache docs out/docs
 
+figures: $(ready) ## pictures of README and pages whose demo has changed, by running it
+	.venv/bin/python demos/pictures/make.py
+
+notebooks: $(ready) ## the notebooks in docs/notebooks, from the scripts of the demos
+	.venv/bin/python docs/notebooks/make.py
+
 bench: $(ready) ## the speed problems beside what a careful script does
 	mkdir -p out/bench
 	.venv/bin/fxcrack bench dcb2d --baseline --json out/bench/dcb2d.json
@@ -45,4 +51,4 @@ distclean: clean ## remove the environment too
 $(ready): pyproject.toml .ci/bootstrap
 	.ci/bootstrap
 
-.PHONY: help demo smoke random test test-slow test-all lint docs bench clean distclean
+.PHONY: help demo smoke random test test-slow test-all lint docs figures notebooks bench clean distclean

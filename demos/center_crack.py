@@ -95,7 +95,7 @@ def onset_errors(
 
 def onsets(history: fx.History, *columns: str) -> list[np.ndarray]:
     """Columns of a history at the states just before nodes went."""
-    at = history["event"] == "onset"
+    at = np.isin(history["event"], ["onset", "unstable"])
     return [history[c][at].astype(float) for c in columns]
 
 

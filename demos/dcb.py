@@ -7,7 +7,7 @@
 #
 #     P = sqrt(Gc b E I)/(a + chi h),      opening = 2 P (a + chi h)^3/(3 E I).
 #
-# The whole propagation costs one factorisation: see the last line this demo prints.
+# The whole propagation costs one factorisation, which is counted at the end.
 """Double cantilever beam in 2-D against corrected beam theory."""
 
 from __future__ import annotations

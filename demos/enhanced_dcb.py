@@ -38,7 +38,7 @@ def run(
         debonds=[fx.Debond(bond, fx.EnhancedVCCT(GIc=ONSET, GIc_p=propagation))],
     )
     history = scene.run(fx.Static(until=fx.CrackLength(bond, until)))
-    onsets = [row for row in history if row["event"] == "onset"]
+    onsets = history.rows_of("onset", "unstable")
     first, last = onsets[0], onsets[-1]
     # at an onset every node behind the tip has opened all the way
     # what ran away where the next bond was stronger than the last one is no fracture energy

@@ -105,7 +105,7 @@ def run(
         for beam in (BEAM, STRAIN_BEAM)
     )
     area, spent = history["area[bond]"][inside], history["released_energy"][inside]
-    soft, onsets = scene.solver.soft_counts, int((history["event"] == "onset").sum())
+    soft, onsets = scene.solver.soft_counts, len(history.rows_of("onset", "unstable"))
     return scene, {
         "load / theory": stress,
         "load / plane strain": strain,

@@ -138,7 +138,7 @@ def run(
     """
     scene, bond = make_scene(dx, ny, until, **options)
     history = scene.run(fx.Static(until=fx.CrackLength(bond, until), maximum=4.0))
-    at = history["event"] == "onset"
+    at = np.isin(history["event"], ["onset", "unstable"])
     a, opening, load, rate, outer, inner = (
         history[c][at].astype(float)
         for c in ("a[bond]", "time", "R[pin_top.y]", "GI[bond]", "m[outer]", "m[inner]")

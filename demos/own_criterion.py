@@ -55,7 +55,7 @@ def run(criterion, dx=0.5, length=100.0, solver=None, release=fx.StepRelease(), 
         solver=solver,
     )
     history = scene.run(fx.Static(until=fx.Releases(count)), progress=False)
-    return history, [row for row in history if row["event"] == "onset"]
+    return history, history.rows_of("onset", "unstable")
 
 
 def main(out: Path, fine: bool = False) -> None:

@@ -81,7 +81,7 @@ def run(
 
 def onsets(history: fx.History) -> Array:
     """Columns a, opening of the pins, load, opening behind the tip, plastic work at each onset."""
-    at = history["event"] == "onset"
+    at = np.isin(history["event"], ["onset", "unstable"])
     names = "a[bond]", "time", "R[pin_top.y]", "cod[bond]"
     columns = [history[c][at].astype(float) for c in names]
     spent = history["plastic_energy"][at] if "plastic_energy" in history.columns else 0.0 * at[at]

@@ -105,7 +105,7 @@ def run(dx: float = 0.25, until: float = 10.0, solver: str | None = None) -> tup
         solver=solver,
     )
     history = scene.run(fx.Static(until=fx.CrackLength(bond, until)))
-    at = history["event"] == "onset"
+    at = np.isin(history["event"], ["onset", "unstable"])
     a, drop = (history[c][at].astype(float) for c in ("a[bond]", "time"))
     rate = sum(history[f"{mode}[bond]"][at].astype(float) for mode in ("GI", "GII"))
     return scene, np.array([a, drop, rate / np.array([steady_rate(d) for d in drop])]).T

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from fxcrack.base import compat  # noqa: F401  # isort: skip  (orders MPI before DOLFINx)
 from fxcrack.base.errors import EnergyError, FxcrackError, InputError
+from fxcrack.base.log import show as show_log
 from fxcrack.base.parallel import install as _install_abort
 from fxcrack.base.signals import Interrupted
 from fxcrack.condensation.options import CondensedOptions
@@ -63,7 +64,7 @@ from fxcrack.deck.deck import Deck, read_deck
 from fxcrack.deck.write import write_deck
 from fxcrack.effects import FiniteStrain
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.front_line import FrontLine, front_lines
@@ -215,6 +216,7 @@ __all__ = [
     "ply_results",
     "read_deck",
     "read_mesh",
+    "show_log",
     "tip_table",
     "with_usual_names",
     "write_deck",

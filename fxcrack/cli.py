@@ -84,6 +84,18 @@ def options(
     """Crack propagation along predefined, initially bonded interfaces, on FEniCSx."""
 
 
+_LogOption = Annotated[
+    str, typer.Option("--log", help="Log of this level on stderr: debug, info, warning, error.")
+]
+_QuietOption = Annotated[bool, typer.Option("--quiet", "-q", help="No progress; warnings stay.")]
+
+
+def _listen(level: str, quiet: bool) -> None:
+    """Show the log of a level and above, and the progress unless it is not wanted."""
+    log.show(level)
+    log.progress.setLevel(logging.WARNING if quiet else logging.INFO)
+
+
 # -- demos ---------------------------------------------------------------------------
 
 
@@ -116,8 +128,11 @@ def demo(
     restart: Annotated[
         bool, typer.Option("--restart", help="Go on from OUT/checkpoints, and keep them.")
     ] = False,
+    level: _LogOption = "warning",
+    quiet: _QuietOption = False,
 ) -> None:
     """Run a demo."""
+    _listen(level, quiet)
     titles = demo_titles()
     if name is None:
         table = Table(box=None, show_header=False)
@@ -159,8 +174,11 @@ def run(
     report: Annotated[
         bool, typer.Option("--report", help="Write report.html: pictures, energies, cost.")
     ] = False,
+    level: _LogOption = "warning",
+    quiet: _QuietOption = False,
 ) -> None:
     """Run a keyword deck, and write its history, fields, bonds and crack tips."""
+    _listen(level, quiet)
     from fxcrack.deck.run import check_only, run_deck
 
     if check:

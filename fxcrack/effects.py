@@ -28,7 +28,8 @@ from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.continuum.tied_elastic import TiedElastic
 from fxcrack.interface.crack_pressure import CrackPressure
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.plan import SOLVERS, Plan
 

@@ -16,7 +16,7 @@ from typing import Any, Protocol, Self
 
 from fxcrack.base.checks import number_or_nan
 from fxcrack.base.errors import FxcrackError, InputError
-from fxcrack.history import History, Row
+from fxcrack.history import BEFORE_RELEASE, History, Row
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
@@ -249,12 +249,12 @@ def _first(history: History, grow: Sequence[Debond], *, cycles: bool) -> tuple[R
     for row in history:
         if cycles and row["event"] == "cycle":
             return row, names[0], 0.0
-        if cycles or row["event"] not in ("onset", "increment"):
+        if cycles or row["event"] not in (*BEFORE_RELEASE, "increment"):
             continue
         f = {n: float(row.get(f"f[{n}]", 0.0)) for n in names}
         name = max(f, key=lambda n: f[n])
         if f[name] >= 1.0 - 1e-9:
-            excess = f[name] - 1.0 if row["event"] == "increment" else 0.0
+            excess = f[name] - 1.0 if row["event"] != "onset" else 0.0
             return row, name, max(excess, 0.0)
     raise AccuracyError(
         "the accuracy of this run cannot be judged: nothing grew in it "

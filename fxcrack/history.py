@@ -1,7 +1,7 @@
 """The history of an analysis: a table with one row per event, and how it is written.
 
-Events: start and end of a step; "onset" (just before a release, at f = 1, or above 1 in unstable
-growth, where more nodes go at one load; not in increment stepping), "release" (just after), "bend"
+Events: start and end of a step; just before a release "onset" (at f = 1) or "unstable" (at f above
+1: further nodes go at the same load), neither in increment stepping; "release" (just after), "bend"
 (an amplitude changes its slope, in event stepping: everything is linear in time between rows),
 "snap" (cohesive bonds have run through unstable states), "increment".
 
@@ -22,7 +22,7 @@ import html
 import json
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, overload
@@ -31,6 +31,7 @@ import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
+from fxcrack.base import log
 from fxcrack.base.checks import number
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
@@ -39,10 +40,17 @@ from fxcrack.base.parallel import all_or_none
 Row = dict[str, float | int | str]
 
 
-_AT_ONE = 1e-6
-"""How far from 1 f may be at an onset that counts as one at f = 1."""
+AT_ONE = 1e-6
+"""How far from 1 f may be at an onset: searches for f = 1 end so near to it at least."""
+BEFORE_RELEASE = ("onset", "unstable")
+"""Events whose rows stand just before a release, at f = 1 and above it."""
 _FORMER_DETAILS = {"window": "retained"}
 """Former names of details; they are removed in the next release."""
+
+
+def _names_of(event: str | Sequence[str] | None) -> tuple[str, ...] | None:
+    """Names of events from one or several."""
+    return (event,) if isinstance(event, str) else None if event is None else tuple(event)
 
 
 class Details(dict[str, Any]):
@@ -89,6 +97,14 @@ class History:
         """Communicator; rank 0 writes files."""
         return self._comm
 
+    def __repr__(self) -> str:
+        """Number of rows and columns, and why the last step ended."""
+        return f"<History of {len(self)} rows and {len(self.columns)} columns: {self.reason}>"
+
+    def __str__(self) -> str:
+        """What happened, see :meth:`describe`."""
+        return self.describe()
+
     def __len__(self) -> int:
         """Number of rows."""
         return len(self.rows)
@@ -125,29 +141,56 @@ class History:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])
 
-    def at(self, column: str, value: float, *, event: str | None = None) -> Row:
-        """First row where a column reaches a value (to round-off), optionally of one event.
+    def rows_of(self, *events: str) -> list[Row]:
+        """Rows of some events, in order; ``rows_of("onset", "unstable")`` stand before releases."""
+        return [row for row in self.rows if row["event"] in events]
+
+    def at(self, column: str, value: float, *, event: str | Sequence[str] | None = None) -> Row:
+        """First row where a column reaches a value (to round-off), optionally of some events.
+
+        Args:
+            column: The column.
+            value: The value.
+            event: Event or events of the row. "onset" are rows at f = 1; a warning says where a row
+                "unstable", at f above 1, has reached the value before.
 
         Raises:
             InputError: There is no such row, column or event.
         """
         value = number("history.at", column, value)
+        wanted = _names_of(event)
+        above: Row | None = None
         for row in self.rows:
             found = row.get(column, np.nan)
-            if event is not None and row["event"] != event:
+            if not (isinstance(found, (int, float)) and found >= value - 1e-9 * abs(value)):
                 continue
-            if isinstance(found, (int, float)) and found >= value - 1e-9 * abs(value):
+            if wanted is None or row["event"] in wanted:
+                if above is not None:
+                    log.warn(
+                        "history.at: %s reaches %g in unstable growth, at f above 1 (time %g), "
+                        "before the row at f = 1 that is returned (time %g); for rows before any "
+                        "release give event=('onset', 'unstable')",
+                        column, value, above["time"], row["time"],
+                    )  # fmt: skip
                 return row
+            if "onset" in wanted and row["event"] == "unstable" and "N" not in row:
+                above = above or row
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
-        chosen = [r for r in self.rows if event is None or r["event"] == event]
+        chosen = [r for r in self.rows if wanted is None or r["event"] in wanted]
         if not chosen:
             events = list(dict.fromkeys(str(r["event"]) for r in self.rows))
             unknown_name("row of event", str(event), events)
         most = max((r[column] for r in chosen if column in r), default="none")
+        hint = ""
+        if above is not None:
+            hint = (
+                f"; a row 'unstable' (f above 1, time {above['time']:g}) reaches it: give "
+                "event=('onset', 'unstable')"
+            )
         raise InputError(
             f"there is no row with {column} >= {value:g} among {len(chosen)} rows"
-            f"{'' if event is None else f' of event {event!r}'}; the largest is {most}"
+            f"{'' if event is None else f' of event {event!r}'}; the largest is {most}{hint}"
         )
 
     def load_at(
@@ -156,19 +199,20 @@ class History:
         *,
         x: str | None = None,
         y: str | None = None,
-        event: str = "onset",
+        event: str | Sequence[str] = BEFORE_RELEASE,
     ) -> npt.NDArray[np.float64]:
-        """Load at an opening, interpolated over the rows of one event.
+        """Load at an opening, interpolated over the rows of some events.
 
-        Between two releases a load lies on a saw-tooth; at the onsets it is that of growth. The way
-        from the first row of the history to the first onset is a straight line.
+        Between two releases a load lies on a saw-tooth; before each release it is that of growth.
+        The way from the first row of the history to the first such row is a straight line.
 
         Args:
             opening: Values of the column ``x``, of any shape.
             x: Column; by default the first prescribed displacement that moves, else the
                 displacement of the first load.
             y: Column; by default the reaction or load that belongs to it.
-            event: Rows to interpolate over.
+            event: Event or events whose rows to interpolate over; by default those before
+                releases, "onset" and "unstable".
 
         Returns:
             Values of the column ``y`` where ``x`` has the given values for the first time, of the
@@ -187,11 +231,12 @@ class History:
         for name in (x, y):
             if name not in self.columns:
                 unknown_name("column", name, self.columns)
-        rows = self.rows[:1] + [r for r in self.rows[1:] if r["event"] == event]
+        chosen = _names_of(event) or ()
+        rows = self.rows[:1] + [r for r in self.rows[1:] if r["event"] in chosen]
         points = [(float(r[x]), float(r[y])) for r in rows if x in r and y in r]
         if len(points) < 2:
             events = list(dict.fromkeys(str(r["event"]) for r in self.rows))
-            unknown_name("row of event", event, events)
+            unknown_name("row of event", " or ".join(chosen), events)
         wanted = np.asarray(opening, dtype=np.float64)
         out = np.full(wanted.shape, np.nan)
         for (a, p), (b, q) in pairwise(points):
@@ -204,8 +249,8 @@ class History:
             lost = float(wanted[np.isnan(out)].ravel()[0])
             reached = [a for a, _ in points]
             raise InputError(
-                f"load_at: {x} = {lost:g} lies outside the rows of event '{event}', which reach "
-                f"from {min(reached):g} to {max(reached):g}"
+                f"load_at: {x} = {lost:g} lies outside the rows of event "
+                f"'{' or '.join(chosen)}', which reach from {min(reached):g} to {max(reached):g}"
             )
         return out
 
@@ -235,12 +280,14 @@ class History:
                 f"{int(released[-1])} nodes released"
             )
             f = self[f"f[{title}]"].astype(float) if f"f[{title}]" in names else np.zeros(len(a))
-            onset = self["event"] == "onset"
-            above = int(np.count_nonzero(onset & (f > 1.0 + _AT_ONE)))
-            if above:
+            unstable = (self["event"] == "unstable") & (f > 1.0 + AT_ONE)
+            if "N" in names:  # of cycles: tips above the upper limit of their law
+                unstable &= np.isnan(self["N"].astype(float))
+            if unstable.any():
+                before = int(np.isin(self["event"], BEFORE_RELEASE).sum())
                 lines.append(
-                    f"  unstable growth: f is above 1 at {above} of {int(onset.sum())} onsets, "
-                    f"up to {float(f[onset & (f > 1.0)].max()):.3g}"
+                    f"  unstable growth: f is above 1 before {int(unstable.sum())} of {before} "
+                    f"releases, up to {float(f[unstable].max()):.3g}"
                 )
             grown = np.flatnonzero(np.diff(released.astype(float)) > 0.0)
             if len(grown):

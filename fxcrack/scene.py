@@ -27,7 +27,8 @@ from fxcrack.continuum.section import Section
 from fxcrack.effects import form_terms
 from fxcrack.error_estimate import as_details, check_accuracy, demand
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.mesh import Mesh
 from fxcrack.output.explain import Explanation, explain
@@ -222,7 +223,8 @@ class Scene:
         Args:
             step: What to do and when to stop.
             grow: Debonds that may grow in this step; all by default. The others stay tied.
-            progress: Show load, crack length and f while running (on a terminal only).
+            progress: Show load, crack length, f and time while running: one line of a terminal,
+                lines of the log (``fxcrack.progress``) where there is none.
             observers: Called on all ranks with the name of every event and its row of the
                 history, e.g. :class:`fxcrack.output.fields.FieldSeries`.
             accuracy: Relative error that load and G may have for the mesh's and the increments'

@@ -49,8 +49,9 @@ from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
 from fxcrack.history import History
+from fxcrack.interface.definition import Interface
 from fxcrack.interface.locking import warn_of_locking
-from fxcrack.interface.pairing import Interface, make_pair
+from fxcrack.interface.pairing import make_pair
 from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
 from fxcrack.solvers.base import Solver

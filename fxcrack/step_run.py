@@ -37,6 +37,8 @@ from fxcrack.steps.explicit_setup import prepare_explicit
 from fxcrack.steps.progress import Progress
 from fxcrack.steps.quasi_static import run_static
 from fxcrack.steps.rows import Observer
+from fxcrack.steps.share_done import ShareDone
+from fxcrack.steps.solver_work import SolverWork
 from fxcrack.steps.static import Dynamic, Static
 
 
@@ -73,10 +75,12 @@ def check_step(
             )
         return
     for pair in analysis.pairs:
-        if pair.interface.stiffness is not None:
+        if pair.interface.stiffness is not None and not analysis.linear:
             raise InputError(
                 f"interface '{pair.interface.title}': bonds with a stiffness of their own are for "
-                f"Explicit; leave stiffness out in {type(step).__name__} steps, which hold exactly"
+                "linear bodies and for Explicit; leave stiffness out in "
+                f"{type(step).__name__} steps of nonlinear or moving bodies, whose bonds hold "
+                "exactly"
             )
     effects, why = analysis.effects, analysis.plan.why
     if isinstance(analysis.solver, ExplicitSolver):
@@ -135,7 +139,7 @@ def run_step(
         checkpoint: Where and how often the state is saved.
         restart: Continue from the checkpoint if there is one.
         save: File that holds the history while the step runs.
-        progress: Show the progress on a terminal.
+        progress: Show the progress, on a terminal or as lines of the log.
         observers: Called with the name of every event and its row.
 
     Returns:
@@ -159,8 +163,9 @@ def run_step(
     first = len(analysis.history)
     try:
         analysis.history.reason = restarts.finished or _drive(
-            analysis, step, restarts, progress=progress, observers=observers
-        )
+            analysis, step, restarts,
+            number=files.steps, progress=progress, observers=observers,
+        )  # fmt: skip
     except NotPositiveDefinite as error:
         raise SolverError(held_by_contact(error.why)) from error
     analysis.history.details = _details(analysis)
@@ -230,12 +235,14 @@ def _drive(
     step: Static | Cycles | Explicit,
     restarts: RestartManager,
     *,
+    number: int,
     progress: bool,
     observers: Sequence[Observer],
 ) -> str:
     """Run the step; returns why it ended."""
-    with restarts, Progress(analysis.comm, enabled=progress) as show:
-        every: list[Observer] = [show, *observers]
+    show = Progress(analysis.comm, ShareDone(step), number=number, enabled=progress)
+    with restarts, show:
+        every: list[Observer] = [SolverWork(analysis, number), show, *observers]
 
         def tell(event: str, row: Row) -> None:
             for observe in every:
@@ -256,7 +263,8 @@ def _drive(
             reason = run_static(analysis, step, **controls)
         analysis.history.reason = reason
         restarts.finish(reason)
-        return reason
+    log.info("step %d ended: %s", number, reason)
+    return reason
 
 
 def _details(analysis: Analysis) -> Details:

@@ -93,7 +93,7 @@ def fine_region(
         stop: Length of the line.
         dx: Step, in the fine region if there is one.
         fine: Both ends of the fine region, ``None`` for even steps throughout.
-        coarse_dx: Largest step outside it, ``None`` for 8 dx.
+        coarse_dx: Largest step outside it, ``None`` for 8 dx; steps never fall below dx.
         given: All the coordinates, to use as they are.
 
     Raises:

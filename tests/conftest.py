@@ -171,8 +171,8 @@ def pytest_pycollect_makeitem(
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """With FXCRACK_TEST_SPREAD, leave parameters of a test in turn to the run on 2 or on 3 ranks.
 
-    Every test then still runs on both, each of its parameters on one of them. What bears the mark
-    "each" is not spread.
+    Every test then still runs on both, each of its parameters on one of them: one in three on 3
+    ranks, which share the two cores of a small machine. What bears the mark "each" is not spread.
     """
     if "FXCRACK_TEST_SPREAD" not in os.environ or WORLD.size not in (2, 3):
         return
@@ -183,7 +183,9 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
         item
         for same in tests.values()
         for i, item in enumerate(same)
-        if len(same) > 1 and i % 2 != WORLD.size % 2 and not item.get_closest_marker("each")
+        if len(same) > 1
+        and (i % (3 if len(same) > 2 else 2) == 0) != (WORLD.size == 3)
+        and not item.get_closest_marker("each")
     ]
     config.hook.pytest_deselected(items=left)
     items[:] = [item for item in items if item not in left]

@@ -39,18 +39,20 @@ def strip(
     enf: bool = False,
     lever: float | None = None,
     order: int = 2,
+    layers: int = 1,
+    criterion: fx.VCCT | None = None,
 ) -> fx.Scene:
     """A strip 1 wide, x along, y upwards, cracked for x < a; unit load down at mid-span.
 
     SLB: the upper arm alone rests on the left support. ENF: the lower one does, faces in contact.
     MMB: that with a ``lever`` c, which lifts the cracked end by c/L and presses by (c + L)/L.
-    ``per_ply``: solid cells for each ply; 0: one continuum shell per arm.
+    ``per_ply``: solid cells for each ply; 0: ``layers`` continuum shells per arm.
     """
     x = np.arange(round(2 * half_span / dx) + 1) * dx
     plies = [lam.interfaces(sign * 0.5 * lam.thickness) for lam, sign in ((upper, 1), (lower, -1))]
     plies[0][0] = plies[1][-1] = 0.0
     lines = [
-        z[[0, -1]]
+        np.linspace(z[0], z[-1], layers + 1)
         if not per_ply
         else np.interp(np.arange((len(z) - 1) * per_ply + 1) / per_ply, np.arange(len(z)), z)
         for z in plies
@@ -101,7 +103,7 @@ def strip(
             fx.Displacement("side", z=0.0),
         ],
         loads=loads,
-        debonds=[fx.Debond(bond, fx.VCCT(GIc=1e9))],
+        debonds=[fx.Debond(bond, criterion or fx.VCCT(GIc=1e9))],
     )
     scene.run(fx.Static(until=fx.Time(1.0)), progress=False)
     return scene

@@ -143,7 +143,7 @@ def time_of(curve: fx.CrackLengthVsTime, length: float) -> float:
 
 def onsets(history: fx.History) -> list[Row]:
     """Rows at which the criterion was reached."""
-    return [row for row in history if row["event"] == "onset"]
+    return [row for row in history if row["event"] in ("onset", "unstable")]
 
 
 def column(rows: Sequence[Row], name: str) -> Array:

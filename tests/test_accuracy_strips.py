@@ -41,6 +41,7 @@ def test_strips_agree_with_each_other_and_with_theory(name: str) -> None:
     assert found["shell"]["G_II/G"] == pytest.approx(found["continuum shell"]["G_II/G"], abs=0.02)
 
 
+@pytest.mark.slow
 def test_the_picture_and_its_advice() -> None:
     """Errors are counted from the solids, though another line may be nearer to its own limit."""
     study = STRIPS["strip_enf"]

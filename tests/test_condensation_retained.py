@@ -16,7 +16,8 @@ from fxcrack.condensation.retained import CostModel, choose_roles
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import FIXED, FREE, RETAINED
-from fxcrack.interface.pairing import Pair, make_pair
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import make_pair
 from fxcrack.meshes.dcb import dcb_2d
 
 Roles = npt.NDArray[np.int8]

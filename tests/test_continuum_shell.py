@@ -319,6 +319,7 @@ def test_axis_as_a_function_of_position() -> None:
 # -- large rotation --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.verification
 def test_elastica() -> None:
     """A cantilever bent through more than 70 degrees by its tip load."""

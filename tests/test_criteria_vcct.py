@@ -260,7 +260,7 @@ N_SLAVE = 6
 def test_toughness_of_every_kind() -> None:
     per_node = np.arange(1.0, 7.0)
     table = Tabulated([20.0, 120.0], [1.0, 3.0])
-    criterion = VCCT(GIc=per_node, GIIc=lambda x: 10.0 + x[:, 0], GIIIc=table, mix=Reeder(1.5))
+    criterion = VCCT(GIc=per_node, GIIc=lambda x: 10.0 + x[0], GIIIc=table, mix=Reeder(1.5))
     got = criterion.toughness_at(X, NODES, np.array([0.0, 70.0, 500.0]), n_slave=N_SLAVE)
     # The table is linear between and constant beyond its ends.
     assert got.tolist() == [[2.0, 10.0, 1.0], [4.0, 12.0, 2.0], [5.0, 14.0, 3.0]]
@@ -280,8 +280,8 @@ def test_shear_modes_default_to_the_mode_before() -> None:
         ([1.0] * 4, r"GIc has 4 values for 6 slave nodes: without one: slave nodes 4, 5;"),
         ([1.0] * 5, r"5 values for 6 slave nodes: without one: slave node 5;"),
         ([1.0] * 8, r"8 values for 6 slave nodes: entries 6 to 7 are too many"),
-        (lambda x: x[:, 0], r"GIc = 0\.0 at slave node 1; .* not at slave node 1"),
-        (lambda x: np.where(x[:, 0] > 1.0, np.nan, 1.0), r"not at slave nodes 3, 4"),
+        (lambda x: x[0], r"GIc = 0\.0 at slave node 1; .* not at slave node 1"),
+        (lambda x: np.where(x[0] > 1.0, np.nan, 1.0), r"not at slave nodes 3, 4"),
         (
             lambda x: np.ones(7),
             r"GIc gives shape \(7,\) for positions x of shape \(3, 4\); one number per position",

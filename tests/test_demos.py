@@ -79,6 +79,7 @@ def test_mmb_is_close_to_the_standard(lever):
     assert balanced(scene.history)
 
 
+@pytest.mark.quick("1")
 @pytest.mark.parametrize("order", [1, 2])
 def test_penny_meets_sneddon(order):
     scene, found = penny.run(0.05, order)
@@ -107,6 +108,7 @@ def test_dcb3d_front_bows():
     assert balanced(scene.history)
 
 
+@pytest.mark.slow
 def test_shell_dcb_is_close_to_the_solids_with_long_cells():
     """Against a coarser reference than the demo's: second-order solids, 2 per arm, 2.5 long."""
     reference = shell_dcb.solve(shell_dcb.Model(False, 2.5, 5.0, ny=2, coarse=2.5))

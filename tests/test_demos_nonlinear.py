@@ -97,7 +97,8 @@ def test_arms_of_high_yield_stress_are_elastic(comm: MPI.Intracomm):
 def test_slow_impact_is_quasi_static_and_fast_one_is_not(comm: MPI.Intracomm):
     lengths = np.array([31.0, 32.0, 33.0])
     way = dynamic_dcb.passages(dynamic_dcb.run(1.0, None, until=33.0, comm=comm), lengths)
-    for speed, low, high in ((1e2, 0.98, 1.02), (8e3, 0.6, 0.85)):
+    cases = ((8e3, 0.6, 0.85), (1e2, 0.98, 1.02))
+    for speed, low, high in cases if comm.size == 1 else cases[:1]:  # the slow one: 634 increments
         history = dynamic_dcb.run(1.0, speed, until=33.0, comm=comm)
         ratio = speed * dynamic_dcb.passages(history, lengths) / way
         assert low < ratio.min() and ratio.max() < high

@@ -50,12 +50,13 @@ def test_contact_adds_no_energy_to_arms_left_alone(
 ) -> None:
     """After the pulse the energy stays (rho_inf = 1) or falls; it grew up to 34 times before."""
     scene = arms(comm, rho_inf, friction=friction)
-    history = scene.run(fx.Dynamic(until=fx.Time(3e-4), dt=2e-6), progress=False)
+    end = 3e-4 if comm.size == 1 else 1.2e-4
+    history = scene.run(fx.Dynamic(until=fx.Time(end), dt=2e-6), progress=False)
     energy = column(history, "strain_energy") + column(history, "kinetic_energy")
     work = column(history, "external_work")[-1]
     after = energy[column(history, "time") > 4.1e-5]
     assert np.abs(column(history, "balance")).max() < 1e-10 * work
-    assert scene.solver.system.contact_steps > 20 or friction is not None
+    assert scene.solver.system.contact_steps > 5e4 * end or friction is not None
     if rho_inf == 1.0:
         assert np.abs(column(history, "numerical_dissipation")).max() < 1e-9 * work
         if friction is None:
@@ -68,6 +69,7 @@ def test_contact_adds_no_energy_to_arms_left_alone(
         assert column(history, "friction_energy")[-1] > 0.0
 
 
+@pytest.mark.slow
 def test_conservation_holds_with_damping_as_the_increment_goes_to_zero(
     comm: MPI.Intracomm,
 ) -> None:
@@ -342,6 +344,7 @@ def test_a_sliding_block_is_stopped_by_friction(comm: MPI.Intracomm) -> None:
 # -- restart ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_run_that_was_interrupted_in_contact_goes_on_as_it_would_have(
     comm: MPI.Intracomm, tmp_path: Path
 ) -> None:

@@ -170,6 +170,7 @@ def test_a_press_fit_gives_the_energy_it_stores(
         assert any("5 open nodes overlap" in m for m in caplog.messages)
 
 
+@pytest.mark.quick("linear")
 @pytest.mark.parametrize("effects", EFFECTS)
 def test_bonds_that_held_an_overlap_give_its_energy_as_they_are_released(
     comm: MPI.Intracomm, effects: str

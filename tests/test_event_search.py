@@ -47,7 +47,7 @@ def arms(comm: MPI.Intracomm, debond: dict[str, Any], load: str, **options: Any)
 
 
 def onsets(history: fx.History, name: str) -> np.ndarray:
-    return np.array([r[name] for r in history if r["event"] == "onset"], dtype=float)
+    return np.array([r[name] for r in history if r["event"] in ("onset", "unstable")], dtype=float)
 
 
 def imbalance(history: fx.History) -> float:
@@ -197,6 +197,7 @@ def yielding(first: int = 5) -> fx.Scene:
     )
 
 
+@pytest.mark.slow
 def test_search_among_yielding_bodies_and_softening_bonds_is_bounded(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -352,6 +352,7 @@ def test_warnings(caplog: pytest.LogCaptureFixture) -> None:
     assert "no criterion" in caplog.text
 
 
+@pytest.mark.slow
 def test_step_release_runs_through_tough_parts_and_progressive_release_does_not() -> None:
     """A crack that runs at G = 1.2 G_c comes to a part with twice the toughness."""
     reached = []
@@ -373,7 +374,7 @@ def test_step_release_runs_through_tough_parts_and_progressive_release_does_not(
             debonds=[
                 fx.Debond(
                     interface,
-                    fx.VCCT(GIc=lambda x: np.where(x[:, 0] < 7.0 * HALF, G_IC, 2.0 * G_IC)),
+                    fx.VCCT(GIc=lambda x: np.where(x[0] < 7.0 * HALF, G_IC, 2.0 * G_IC)),
                     release=release,
                 )
             ],

@@ -52,6 +52,7 @@ def test_condensed_steps_have_one_element_of_softening() -> None:
     scene.close()
 
 
+@pytest.mark.slow
 def test_penalty_contact_lets_faces_overlap_a_little() -> None:
     exact = run(beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF)))
     scene = beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF))
@@ -91,6 +92,7 @@ def test_friction_dissipates() -> None:
     assert abs(history["balance"]).max() <= 1e-10 * kinetic
 
 
+@pytest.mark.slow
 def test_mass_scaling_and_damping() -> None:
     plain = beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF))
     first = plain.run(fx.Explicit(until=fx.Time(1e-5), rows=5))
@@ -117,6 +119,7 @@ def test_mass_scaling_and_damping() -> None:
     assert imbalance(history) <= 1e-10
 
 
+@pytest.mark.quick("svk")
 @pytest.mark.parametrize("kind", ["svk", "neo"])
 def test_finite_strain_balances(kind: str) -> None:
     effects: list[Any] = [fx.Inertia(density=2.7e-9)]
@@ -219,6 +222,7 @@ def test_energies_balance_where_the_increment_changes() -> None:
     assert imbalance(history) <= 1e-10
 
 
+@pytest.mark.quick("matching")
 @pytest.mark.parametrize("nx_lower", [None, 44], ids=["matching", "not matching"])
 def test_bonds_soften_beside_friction(nx_lower: int | None) -> None:
     """Arms pressed on each other are sheared apart: bonds soften, faces slide under pressure."""

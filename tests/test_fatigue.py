@@ -122,6 +122,7 @@ def test_pure_moments_give_a_straight_line(method):
 # --- ends of a step -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_onset_comes_first_and_cycles_may_be_divided_into_steps():
     scene = fatigue_specimen(criterion=fatigue_law(credit=True))
     whole = growth_curve(

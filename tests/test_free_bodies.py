@@ -26,7 +26,9 @@ def first_loads(mesh: fx.Mesh, **options: Any) -> Array:
     assert history.reason == "3 nodes released"
     work = np.abs(history["external_work"].astype(float)).max()
     assert np.abs(history["balance"].astype(float)).max() < 1e-4 * work
-    return np.array([float(r["R[pin_top.y]"]) for r in history if r["event"] == "onset"])
+    return np.array(
+        [float(r["R[pin_top.y]"]) for r in history if r["event"] in ("onset", "unstable")]
+    )
 
 
 # -- held, however small the pivots ----------------------------------------------------------------
@@ -52,7 +54,11 @@ def test_stiffness_contrast(soft: str, far: bool) -> None:
             options["supports"] = [*pins, *FAR]
             history = specimen(arms(), a0=20.0, **options).run(GROW, progress=False)
             loads[power] = np.array(
-                [-float(r["R[pin_bottom.y]"]) for r in history if r["event"] == "onset"]
+                [
+                    -float(r["R[pin_bottom.y]"])
+                    for r in history
+                    if r["event"] in ("onset", "unstable")
+                ]
             )
         else:
             loads[power] = first_loads(arms(), **options)

@@ -77,6 +77,7 @@ def assert_coulomb(block: ContactBlock, load: Array, reference: Array, found: In
     assert -power.sum() > -ROUND_OFF
 
 
+@pytest.mark.slow
 @given(seed=seeds, m=st.integers(1, 12), d=st.sampled_from([2, 3]))
 @settings(max_examples=150)
 def test_an_increment_obeys_the_laws(seed: int, m: int, d: int) -> None:
@@ -167,6 +168,7 @@ def legs(seed: int, m: int, d: int) -> tuple[float, float, float]:
     return work, system.strain_energy(state), taken
 
 
+@pytest.mark.slow
 @given(seed=seeds, m=st.integers(1, 10))
 @settings(max_examples=40)
 def test_the_path_in_the_plane_keeps_the_laws_and_the_energy(seed: int, m: int) -> None:

@@ -144,7 +144,7 @@ def test_a_crack_that_stops_for_good_ends_in_the_state_of_its_last_release() -> 
     # it runs into a part of the interface that is stronger by far
     scene = dcb(
         MPI.COMM_SELF, dx=1.0, ny=2,
-        criterion=fx.VCCT(GIc=lambda x: np.where(x[:, 0] < 34.5, 0.2, 1e70)),
+        criterion=fx.VCCT(GIc=lambda x: np.where(x[0] < 34.5, 0.2, 1e70)),
     )  # fmt: skip
     history = grow_to(scene, 60.0)
     assert history.reason.startswith("the criterion is not reached however large the load becomes")
@@ -158,7 +158,7 @@ def test_a_crack_that_stops_for_good_ends_in_the_state_of_its_last_release() -> 
 def test_softening_bonds_are_as_they_were_where_the_search_began() -> None:
     scene = dcb(
         MPI.COMM_SELF, dx=1.0, ny=2, release=fx.ProgressiveRelease(),
-        criterion=fx.VCCT(GIc=lambda x: np.where(x[:, 0] < 31.5, 0.2, 1e70)),
+        criterion=fx.VCCT(GIc=lambda x: np.where(x[0] < 31.5, 0.2, 1e70)),
     )  # fmt: skip
     history = grow_to(scene, 60.0)
     assert history.reason.startswith("the criterion is not reached however large the load becomes")

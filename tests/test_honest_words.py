@@ -25,12 +25,17 @@ def test_unstable_growth_is_told_from_onsets_at_one() -> None:
     """Under forces f grows as a^2: every node after the first goes at the same load, at f > 1."""
     scene = specimen(plate(MPI.COMM_SELF), supports=HELD_FAR, loads=FORCES)
     history = grow_to(scene, 40.0)
-    f = [float(r["f[bond]"]) for r in history if r["event"] == "onset"]
+    f = [float(r["f[bond]"]) for r in history.rows_of("onset", "unstable")]
     assert len(f) == 5
     assert f[0] == pytest.approx(1.0, abs=1e-6)
     assert min(f[1:]) > 1.1  # (32/30)^2 = 1.14, and a little less as arms shear, too
+    # and the names of the rows say which is which
+    assert [r["event"] for r in history.rows_of("onset", "unstable")] == [
+        "onset",
+        *4 * ["unstable"],
+    ]
     said = history.describe()
-    assert f"unstable growth: f is above 1 at 4 of 5 onsets, up to {max(f):.3g}" in said
+    assert f"unstable growth: f is above 1 before 4 of 5 releases, up to {max(f):.3g}" in said
     scene.close()
     stable = specimen(plate(MPI.COMM_SELF))
     assert "unstable" not in grow_to(stable, 36.0).describe()
@@ -160,3 +165,28 @@ def test_triangles_without_bending(caplog: pytest.LogCaptureFixture) -> None:
     scene = specimen(mesh, a0=8.0, supports=rails)
     assert not opened(scene, (1e-2,), caplog)
     scene.close()
+
+
+def test_rows_above_one_are_found_by_name(caplog: pytest.LogCaptureFixture) -> None:
+    """What asks for rows at f = 1 is told where a row above it came first."""
+    history = fx.History(MPI.COMM_SELF)
+    for event, a, f, u, load in (
+        ("start", 30.0, 0.0, 0.0, 0.0),
+        ("onset", 30.0, 1.0, 1.0, 8.0),
+        ("unstable", 31.0, 1.2, 1.0, 6.0),
+        ("onset", 33.0, 1.0, 2.0, 5.0),
+        ("unstable", 35.0, 1.1, 2.0, 4.0),
+    ):
+        row = {"time": u, "event": event, "a[bond]": a, "f[bond]": f, "u[p]": u, "R[p]": load}
+        history.append(row)
+    assert [r["a[bond]"] for r in history.rows_of("onset", "unstable")] == [30.0, 31.0, 33.0, 35.0]
+    assert history.at("a[bond]", 31.0, event=("onset", "unstable"))["event"] == "unstable"
+    assert history.at("a[bond]", 30.0, event="onset")["f[bond]"] == 1.0
+    assert not caplog.text
+    assert history.at("a[bond]", 31.0, event="onset")["a[bond]"] == 33.0
+    assert "reaches 31 in unstable growth, at f above 1 (time 1)" in caplog.text
+    with pytest.raises(fx.InputError, match=r"'unstable' .*reaches it: give event="):
+        history.at("a[bond]", 35.0, event="onset")
+    # from the last row of one opening to the next onset, as before rows had two names
+    assert history.load_at(1.5) == pytest.approx(0.5 * (6.0 + 5.0))
+    assert history.load_at(1.5, event="onset") == pytest.approx(0.5 * (8.0 + 5.0))

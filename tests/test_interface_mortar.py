@@ -176,7 +176,11 @@ def pull_out(
     )
     scene.close()
     return np.array(
-        [0.05 / (float(r["time"]) ** 2 / 4 / fibre) for r in history if r["event"] == "onset"]
+        [
+            0.05 / (float(r["time"]) ** 2 / 4 / fibre)
+            for r in history
+            if r["event"] in ("onset", "unstable")
+        ]
     )
 
 

@@ -19,7 +19,8 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.jump_coordinates import RETAINED, JumpCoordinates, build_coordinates
 from fxcrack.interface.nodes import JumpGather
-from fxcrack.interface.pairing import Pair, make_pair
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import make_pair
 from fxcrack.interface.supports import Supports, collect_supports
 from fxcrack.meshes.dcb import dcb_3d
 

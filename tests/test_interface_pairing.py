@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -14,7 +15,8 @@ import fxcrack as fx
 from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.jump_coordinates import RETAINED, JumpCoordinates, build_coordinates
-from fxcrack.interface.pairing import Pair, make_pair
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import make_pair
 from fxcrack.interface.supports import collect_supports
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build
@@ -282,7 +284,7 @@ def test_bonded_sets(comm: MPI.Intracomm) -> None:
     assert pair(None).bonded.all() and pair("upper_face").bonded.all()
     assert np.array_equal(pair("far_upper").bonded, np.isclose(x, 4.0))
     assert np.array_equal(pair(x > 2.0).bonded, x > 2.0)
-    assert np.array_equal(pair(lambda y: y[0] > 2.0).bonded, x > 2.0)
+    assert np.array_equal(pair(lambda y: y[0] > 2.0).bonded, x > 1.9)  # with its border
     refused(
         comm,
         r"bonded gives shape \(3,\); one boolean for each of the 9 slave nodes",
@@ -363,3 +365,40 @@ def test_impossible_supports(comm: MPI.Intracomm, support: fx.Displacement, mess
 def test_support_of_nothing() -> None:
     with pytest.raises(InputError, match="prescribes nothing; give x, y or z"):
         fx.Displacement("top")
+
+
+@pytest.mark.parametrize(
+    "region",
+    [
+        lambda x: x[0] >= 30.0 + 1e-9,
+        lambda x: x[0] > 30.0,
+        lambda x: ~(x[0] <= 30.0),
+        lambda x: x[0] + x[1] >= 30.0 + 1e-7,
+    ],
+    ids=["round-off", "open", "complement", "inclined"],
+)
+def test_a_node_on_the_border_of_the_bonded_region_is_bonded(region: Callable[..., Any]) -> None:
+    """Within 1e-6 of a facet length; none of the positions asked for leaves the surface."""
+    mesh = dcb_2d(dx=1.0, ny=1)
+    asked = []
+
+    def bonded(x: Any) -> Any:
+        asked.append(x)
+        return region(x)
+
+    scene = fx.Scene(
+        mesh,
+        materials=fx.Isotropic(E=1.0, nu=0.0),
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("pin_top", x=0.0, y=1.0),
+            fx.Displacement("pin_bottom", x=0.0, y=-1.0),
+        ],
+        debonds=[
+            fx.Debond(fx.Interface("upper_face", "lower_face", bonded=bonded), fx.VCCT(GIc=1.0))
+        ],
+    )
+    history = scene.run(fx.Static(until=fx.Releases(1)))
+    assert history["a[upper_face]"][0] == pytest.approx(30.0, abs=1e-9)
+    x = np.concatenate(asked, axis=1)
+    assert x[0].min() > -1e-12 and abs(x[1]).max() < 1e-12

@@ -71,12 +71,16 @@ def test_the_mouth_opens_steadily_while_the_load_falls(comm: MPI.Intracomm) -> N
     # never falls, and stays as nodes let go
     assert (np.diff(opening) > -1e-12 * opening[-1]).all()
     event = history["event"]
-    assert opening[event == "release"] == pytest.approx(opening[event == "onset"], rel=1e-12)
+    assert opening[event == "release"] == pytest.approx(
+        opening[np.isin(event, ["onset", "unstable"])], rel=1e-12
+    )
     found = onsets(history)
     a, load = column(found, "a[bond]"), column(found, "F[pin_top]")
     # a is 7 heights: 0.6 % in load, 1.5 % in opening
     assert load == pytest.approx(ARM.dcb_load(a, GIC), rel=0.02)
-    assert opening[event == "onset"] == pytest.approx(ARM.dcb_opening(a, load), rel=0.02)
+    assert opening[np.isin(event, ["onset", "unstable"])] == pytest.approx(
+        ARM.dcb_opening(a, load), rel=0.02
+    )
     assert (np.diff(load) < 0.0).all()
     # each onset is one equilibrium, however it is reached
     traced = short_dcb(comm).run(fx.Static(until=fx.Releases(6), stepping="path"))
@@ -107,7 +111,9 @@ def test_arms_that_turn_far_open_steadily_too(comm: MPI.Intracomm) -> None:
     opening = column(history, "m[pin_top]") - column(history, "m[pin_bottom]")
     assert (np.diff(opening) > -1e-9 * opening[-1]).all()
     event = history["event"]
-    assert opening[event == "release"] == pytest.approx(opening[event == "onset"], rel=2e-9)
+    assert opening[event == "release"] == pytest.approx(
+        opening[np.isin(event, ["onset", "unstable"])], rel=2e-9
+    )
     assert opening[-1] > 4.0  # arms of 10
     _, traced = run(stepping="path")
     for name in ("F[pin_top]", "m[pin_top]", "a[bond]"):  # each onset is one equilibrium
@@ -116,6 +122,7 @@ def test_arms_that_turn_far_open_steadily_too(comm: MPI.Intracomm) -> None:
     assert largest_imbalance(history) < 1e-4
 
 
+@pytest.mark.slow
 def test_the_slip_of_flexure_grows_while_its_deflection_snaps_back() -> None:
     history = flexure(17.0, 38.0, by_force=True, stepping="opening", opening=("lower", "upper"))
     found = onsets(history)

@@ -70,6 +70,7 @@ def test_spacing_that_changes_does_not_show() -> None:
     np.testing.assert_allclose(found[1][1][1:], found[0][1][1:], rtol=0.05)
 
 
+@pytest.mark.slow
 def test_blocks_of_another_amplitude_add_up() -> None:
     whole = fatigue_specimen(criterion=fatigue_law(partial=True))
     parts = fatigue_specimen(criterion=fatigue_law(partial=True))
@@ -166,6 +167,7 @@ def test_ranks_agree(comm: Any) -> None:
     np.testing.assert_allclose(found[0], found[1], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_going_on_from_a_checkpoint_within_an_element(tmp_path: Path) -> None:
     def make() -> fx.Scene:
         return dcb(MPI.COMM_WORLD, dx=1.0, ny=2, criterion=fatigue_law(partial=True))

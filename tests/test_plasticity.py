@@ -279,6 +279,7 @@ def test_what_does_not_fit(comm: MPI.Intracomm) -> None:
             make()
 
 
+@pytest.mark.quick("1.0")
 @pytest.mark.parametrize("increment", [1.0, 0.25])
 def test_faces_that_close_in_a_long_increment_take_no_energy(
     comm: MPI.Intracomm, increment: float

@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.base.positions import marks_at, numbers_at
+from fxcrack.continuum.starting_velocity import starting_velocity
 from fxcrack.mesh import mesh_from_domain
 from fxcrack.meshes.dcb import dcb_2d
 
@@ -135,6 +136,42 @@ def test_shapes_tell_the_conventions_apart_for_any_number_of_positions(n: int, g
         assert numbers_at("mine", "f", lambda x: x[:, 1], x) == pytest.approx(x[:, 1])
     assert numbers_at("mine", "f", lambda x: 3, x).tolist() == [3.0] * n
     assert marks_at("mine", "f", lambda x: x[0] > 0.5, x).tolist() == (x[:, 0] > 0.5).tolist()
+
+
+@pytest.mark.mpi
+def test_a_starting_velocity_in_explicit_dynamics(comm: MPI.Comm) -> None:
+    """The former convention is told there as well, and a mistake is named on all ranks."""
+
+    def velocities(field: Any) -> Any:
+        made = scene(comm, effects=[fx.Inertia(density=1e-9, velocity=(0.0, field))], loads=[])
+        found = starting_velocity(made.continuum, made.input.effects[0].velocity)
+        made.close()
+        return found
+
+    new = velocities(lambda x: 3.0 * x[0] - x[1])
+    assert max(comm.allgather(float(np.abs(new).max(initial=0.0)))) > 20.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # on ranks that own nodes
+        assert velocities(lambda x: 3.0 * x[:, 0] - x[:, 1]).tolist() == new.tolist()
+    with pytest.raises(fx.InputError, match=r"Inertia: velocity\[1\] gives shape \(2,\)"):
+        velocities(lambda x: np.ones(2))
+
+
+def test_loads_on_the_ring_of_the_domain_integral() -> None:
+    """Pressure on the crack face and body force by either convention give the same G."""
+
+    def rate(first: Any) -> float:
+        loads = [fx.Pressure("upper_face", first), fx.BodyForce((0.0, first))]
+        made = scene(
+            MPI.COMM_SELF, loads=loads, debond={"criterion": fx.VCCT(GIc=0.2, method="domain")}
+        )
+        row = made.run(fx.Static(until=fx.Time(1e-3)), progress=False)[-1]
+        made.close()
+        return float(row["GI[bond]"])
+
+    with pytest.warns(DeprecationWarning, match="takes positions of shape"):
+        former = rate(lambda x: 1.0 + x[:, 0])
+    assert former == rate(lambda x: 1.0 + x[0]) > 0.0
 
 
 def test_distances_are_no_booleans() -> None:

@@ -74,10 +74,12 @@ def test_a_report_needs_a_step_and_its_library(
 
 
 def test_a_description_says_what_happened(comm: MPI.Intracomm) -> None:
-    assert fx.History(comm).describe() == "no rows: no step was run"
+    assert fx.History(comm).describe() == str(fx.History(comm)) == "no rows: no step was run"
     scene = grown(comm)
     history = scene.history
     text = history.describe()
+    assert text == str(history)
+    assert repr(history).startswith(f"<History of {len(history)} rows and ")
     at = int(np.argmax(np.abs(history["R[pin_top.y]"])))
     for words in (
         f"{len(history)} rows: 1 start, 4 onset, 4 release",

@@ -224,6 +224,31 @@ def test_slb(
     assert found[1] / found.sum() == pytest.approx(share, abs=SAME)
 
 
+def test_slb_of_coupled_arms(comm: MPI.Intracomm) -> None:
+    """Arms [90/0] and [0/90], 90 degrees on both sides of the crack; G and G_II/G of solids with
+    cells for each ply, 3.835e-3 and 0.456, less what plates do not see."""
+    mesh = two_arms(comm, length=64.0, width=1.0, heights=(1.5, 1.5), dx=1.0, load_at=32.0)
+    scene = fx.Scene(
+        mesh,
+        model=fx.Shell(),
+        materials={
+            "upper": fx.Section(fx.Laminate("[90/0]", UD, 0.75)),
+            "lower": fx.Section(fx.Laminate("[0/90]", UD, 0.75)),
+        },
+        supports=[
+            fx.Displacement("upper_a0", z=0.0),
+            fx.Displacement("upper_a1", x=0.0, z=0.0),
+            fx.Displacement("upper_b0", y=0.0),
+        ],
+        loads=[fx.PointForce(f"load_{i}", (0.0, 0.0, -0.5)) for i in (0, 1)],
+        debonds=[fx.Debond(bond(16.0), fx.VCCT(GIc=1.0))],
+    )
+    scene.run(FAST, progress=False)
+    found = mean_rates(scene)
+    assert found.sum() / 3.835e-3 - 1.0 == pytest.approx(-0.044, abs=SAME)
+    assert found[1] / found.sum() == pytest.approx(0.437, abs=SAME)
+
+
 def enf(comm: MPI.Intracomm, dx: float = 1.0, **options: Any) -> fx.Scene:
     """End notched flexure, a = 34, half span 88, h = 2.25, with contact of the offset faces."""
     mesh = two_arms(comm, length=176.0, width=1.0, heights=(2.25, 2.25), dx=dx, load_at=88.0)

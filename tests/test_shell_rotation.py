@@ -129,6 +129,7 @@ def elastica(a: float, half: float, stiffness: float) -> tuple[float, float]:
     return stiffness / 2.0 * (integrals(t)[0] / a) ** 2, float(t)
 
 
+@pytest.mark.slow
 def test_dcb_of_large_rotation(comm: MPI.Intracomm) -> None:
     """Arms 60 x 0.5 opened by 80: tips slope by 64 degrees, G against J = 2 P sin(slope)/b."""
     a, height, width, opening = 60.0, 0.5, 5.0, 80.0

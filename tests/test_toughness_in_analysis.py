@@ -21,17 +21,17 @@ LAW = fx.Paris(c1=0.0, c2=-1.0, c3=0.5, c4=4.0, r1=0.2, r2=0.9)
 
 def tough(x: Array) -> Array:
     """Toughness that falls along the beam."""
-    return 0.3 - 0.0015 * x[:, 0]
+    return 0.3 - 0.0015 * x[0]
 
 
 def warm(x: Array) -> Array:
     """Temperature for which the table above gives the same."""
-    return x[:, 0]
+    return x[0]
 
 
 def per_node() -> Array:
     scene = dcb(MPI.COMM_SELF, dx=1.0, ny=2)
-    values = tough(scene.pairs[0].surface.x)
+    values = tough(scene.pairs[0].surface.x.T)
     scene.close()
     return values
 
@@ -68,11 +68,11 @@ def test_three_ways_to_say_the_same(kind: str) -> None:
     x = by_place.pairs[0].surface.x
     if kind == "fatigue":
         tips = by_place.history.details["tips"]
-        assert tips["G_c"] == pytest.approx(tough(x[tips["node"]]), rel=1e-12)
+        assert tips["G_c"] == pytest.approx(tough(x[tips["node"]].T), rel=1e-12)
     else:
         rows = onsets(by_place.history)
         at = x[column(rows, "node[bond]").astype(int)]
-        assert column(rows, "GI[bond]") == pytest.approx(tough(at), rel=1e-4)  # some mode II
+        assert column(rows, "GI[bond]") == pytest.approx(tough(at.T), rel=1e-4)  # some mode II
         assert len(rows) >= 6
 
 
@@ -83,7 +83,7 @@ def test_threshold_and_upper_limit_of_fatigue_follow_the_local_toughness() -> No
     for value in (0.28, 1.5):
         scene = dcb(
             MPI.COMM_SELF, dx=1.0, ny=2,
-            criterion=criterion("fatigue", lambda x, v=value: np.where(x[:, 0] < 31.5, v, 1.5)),
+            criterion=criterion("fatigue", lambda x, v=value: np.where(x[0] < 31.5, v, 1.5)),
         )  # fmt: skip
         history = scene.run(fx.Cycles(maximum=1.0, ratio=0.0))
         events = [r["event"] for r in history]
@@ -124,7 +124,7 @@ def test_strength_and_critical_opening_follow_the_temperature(kind: str) -> None
     assert set(cold) == set(warm_all) == {-1.0, 1.0}
     assert warm_all[1.0] == pytest.approx(0.5 * cold[1.0], rel=1e-9)  # f goes with the load
     # warmer to the right: the right tip goes first, at the strength of its own temperature
-    uneven = first(make(table, lambda x: x[:, 0]))
+    uneven = first(make(table, lambda x: x[0]))
     assert set(uneven) == {1.0}
     assert uneven[1.0] == pytest.approx(0.625 * cold[1.0], rel=1e-9)
     with pytest.raises(fx.InputError, match=r"depends on temperature.*Debond\(temperature=...\)"):
@@ -138,7 +138,7 @@ def test_what_a_temperature_cannot_be() -> None:
     ):
         run(wrong, fx.Releases(1))
     hole = dcb(
-        MPI.COMM_SELF, dx=2.0, ny=1, temperature=lambda x: np.where(x[:, 0] > 50.0, np.nan, 1.0)
+        MPI.COMM_SELF, dx=2.0, ny=1, temperature=lambda x: np.where(x[0] > 50.0, np.nan, 1.0)
     )
     with pytest.raises(fx.InputError, match=r"temperature is nan at \(52, 0\); give a number"):
         run(hole, fx.Releases(1))

@@ -261,7 +261,7 @@ def test_load_at_an_opening_is_interpolated_over_onsets() -> None:
     assert history.load_at(float(at[2]), x="u[pin_top.y]", y="a[bond]") == pytest.approx(
         0.5 * (rows[1]["a[bond]"] + rows[2]["a[bond]"])
     )
-    with pytest.raises(fx.InputError, match="lies outside the rows of event 'onset'"):
+    with pytest.raises(fx.InputError, match="lies outside the rows of event 'onset or unstable'"):
         history.load_at(2.0 * u[-1])
     with pytest.raises(fx.InputError, match="column 'R"):
         history.load_at(0.1, y="R[pin_top.w]")

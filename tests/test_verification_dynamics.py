@@ -11,6 +11,7 @@ from fxcrack.meshes.dcb import dcb_2d
 E, NU, RHO = 210e3, 0.3, 7.85e-9
 
 
+@pytest.mark.quick("explicit")
 @pytest.mark.parametrize("solver", ["explicit", "implicit"])
 def test_stationary_crack_under_sudden_pressure(solver: str) -> None:
     """L. B. Freund, Dynamic Fracture Mechanics (1990), chapter 2: a half-infinite crack.

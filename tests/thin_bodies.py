@@ -48,7 +48,8 @@ def thin_body(
     """Hexahedra over the rectangle (0, size) mapped to a surface, of one thickness about it.
 
     Groups: cells "body"; faces "inner", "outer", and "a0", "a1", "b0", "b1" at the ends of the
-    parameters; the node "corner" of inner, a0 and b0. ``distort`` moves inner corners by
+    parameters; the node "corner" of inner, a0 and b0; the nodes "line0"
+    and "line1" across the body at b0 and a0 or a1. ``distort`` moves inner corners by
     up to this part of a cell.
     """
     a, b = (np.linspace(0.0, s, k + 1) for s, k in zip(size, n, strict=True))
@@ -62,6 +63,8 @@ def thin_body(
             *(("b0", {"y": 0.0}), ("b1", {"y": size[1]})),
             *(("inner", {"z": z[0]}), ("outer", {"z": z[-1]})),
             ("corner", {"x": 0.0, "y": 0.0, "z": z[0]}),
+            ("line0", {"x": 0.0, "y": 0.0}),
+            ("line1", {"x": size[0], "y": 0.0}),
         ):
             model.group(name, block.part(**at))
         return model

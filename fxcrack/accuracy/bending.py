@@ -27,7 +27,7 @@ from fxcrack.continuum.node_supports import Clamp, Symmetry
 from fxcrack.continuum.section import Section
 from fxcrack.criteria import VCCT
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies

@@ -29,7 +29,7 @@ from fxcrack.continuum.loads import Displacement, Monitor, PointForce, Pressure
 from fxcrack.continuum.materials import Isotropic
 from fxcrack.criteria import VCCT, Fatigue
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.meshes.enf import enf_2d
 from fxcrack.meshes.mmb import mmb_2d

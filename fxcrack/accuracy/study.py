@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from fxcrack.base.errors import InputError
 from fxcrack.condensation.options import CondensedOptions
-from fxcrack.history import History, Row
+from fxcrack.history import BEFORE_RELEASE, History, Row
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.end_conditions import Until
@@ -249,7 +249,8 @@ def critical(history: History, interface: str) -> list[Row]:
     rows = [
         row
         for row in history
-        if row["event"] in ("onset", "increment") and float(row.get(name, 0.0)) >= 1.0 - 1e-9
+        if row["event"] in (*BEFORE_RELEASE, "increment")
+        and float(row.get(name, 0.0)) >= 1.0 - 1e-9
     ]
     if not rows:
         raise InputError(

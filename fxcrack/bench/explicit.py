@@ -24,7 +24,7 @@ from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.materials import Isotropic
 from fxcrack.criteria import VCCT
 from fxcrack.effects import FiniteStrain
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.scene import Scene
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.steps.debond import Debond

@@ -26,7 +26,7 @@ from fxcrack.base.parallel import slowest
 from fxcrack.base.processes import run_module
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.condensation.mumps_schur import mumps_message, ordering
-from fxcrack.history import History, Row
+from fxcrack.history import BEFORE_RELEASE, History, Row
 from fxcrack.interface.jump_coordinates import FIXED, FREE, build_coordinates
 from fxcrack.mesh import Mesh
 from fxcrack.scene import Scene
@@ -54,7 +54,7 @@ class TimedHistory(History):
             SolverError: The crack never came that far.
         """
         for i, row in enumerate(self.rows):
-            if row["event"] == "onset" and float(row["a[bond]"]) >= length * (1.0 - 1e-9):
+            if row["event"] in BEFORE_RELEASE and float(row["a[bond]"]) >= length * (1.0 - 1e-9):
                 return i
         raise SolverError(f"the crack did not reach a = {length:g}: {self.reason}")
 

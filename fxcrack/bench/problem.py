@@ -19,7 +19,7 @@ from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.materials import Isotropic
 from fxcrack.criteria import VCCT
 from fxcrack.history import Row
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.scene import Scene

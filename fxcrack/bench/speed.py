@@ -21,6 +21,7 @@ from fxcrack.base.parallel import slowest
 from fxcrack.bench.baselines import Columns, Follower, Matrices, Onset, Refactor
 from fxcrack.bench.measure import Growth, TimedHistory, grow, memory_of_one_solve, solve_once
 from fxcrack.bench.problem import LENGTHS, Problem
+from fxcrack.history import BEFORE_RELEASE
 from fxcrack.mesh import Mesh
 from fxcrack.scene import Scene
 
@@ -108,7 +109,7 @@ def run(
 def _onsets(growth: Growth) -> list[int]:
     """Rows of the events up to the last crack length."""
     rows = growth.history.rows[: growth.last + 1]
-    return [i for i, row in enumerate(rows) if row["event"] == "onset"]
+    return [i for i, row in enumerate(rows) if row["event"] in BEFORE_RELEASE]
 
 
 def _point(problem: Problem, history: TimedHistory, length: float) -> dict[str, float]:

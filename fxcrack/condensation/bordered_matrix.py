@@ -56,8 +56,18 @@ def load_and_monitor_vectors(
     return out
 
 
+def _with_springs(matrix: PETSc.Mat, coordinates: JumpCoordinates) -> PETSc.Mat:
+    """Add the springs of bonds to T^t K T, which holds their entries already; collective."""
+    for one in coordinates.springs:
+        for row, column, value in zip(one.rows, one.columns, one.values, strict=True):
+            matrix.setValue(row, column, value, addv=PETSc.InsertMode.ADD_VALUES)
+    if coordinates.springs:
+        matrix.assemble()
+    return matrix
+
+
 class BorderedMatrix:
-    """A = T^t K T with its borders; collective.
+    """A = T^t K T + D with its borders; collective. D: springs of bonds that have some.
 
     Args:
         stiffness: K; stays with the caller.
@@ -82,7 +92,7 @@ class BorderedMatrix:
         self._transform = coordinates.transform
         self._inner: PETSc.Mat | None = None  # without borders, where that is another matrix
         self._where: Ints = np.zeros(0, dtype=np.int64)  # its entries among those of the whole
-        inner = stiffness.ptap(coordinates.transform)
+        inner = _with_springs(stiffness.ptap(coordinates.transform), coordinates)
         self.on_retained = np.zeros((coordinates.n_retained, len(borders)))
         if not borders:
             self.matrix = inner

@@ -27,7 +27,7 @@ from fxcrack.condensation.rigid_motions import held_dofs, motions_of, ways
 from fxcrack.continuum.bodies import Bodies
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 
 _UNSEEN = 1e-8

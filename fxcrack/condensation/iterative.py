@@ -29,7 +29,7 @@ from fxcrack.interface.jump_coordinates import (
     JumpCoordinates,
     build_coordinates,
 )
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 
 Roles = list[npt.NDArray[np.int8]]

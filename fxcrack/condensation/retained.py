@@ -22,7 +22,7 @@ from fxcrack.base.arrays import Bools
 from fxcrack.base.errors import InputError
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import FIXED, FREE, RETAINED
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 WAKE_ROWS = 2
 """Rows of open nodes behind the front that stay retained."""

@@ -46,6 +46,13 @@ from fxcrack.mesh import Mesh
 Ints = npt.NDArray[np.int32]
 
 
+BESIDE_SOLIDS = (
+    "the cells of a scene are of one dimension: model shells beside solids as ContinuumShell, on "
+    "hexahedra one cell thick"
+)
+"""What to do where surface cells and volumes are to stand in one scene."""
+
+
 class Continuum:
     """Elastic bodies on one mesh.
 
@@ -94,7 +101,7 @@ class Continuum:
             what = "surface cells in space, which are for Shell()" if mesh.tdim == 2 else "volumes"
             raise InputError(
                 f"{type(model).__name__} needs cells of dimension {model.tdim}, but mesh "
-                f"'{mesh.name}' has {what}"
+                f"'{mesh.name}' has {what}; {BESIDE_SOLIDS}"
             )
         if isinstance(model, Axisymmetric):
             r = mesh.domain.geometry.x[:, 0]
@@ -156,7 +163,7 @@ class Continuum:
         if getattr(material, "form", "elastic") == "shell":
             raise InputError(
                 "materials: a Section belongs to shells; write Scene(..., model=Shell()) on a "
-                "surface mesh, or give the material itself"
+                f"surface mesh, or give the material itself; {BESIDE_SOLIDS}"
             )
 
     @property

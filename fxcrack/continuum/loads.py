@@ -128,9 +128,7 @@ class Traction:
 
     def __post_init__(self) -> None:
         """Check names and components."""
-        _check_names(type(self).__name__, self.where, self.name)
-        owner = f"load '{self.title}'"
-        keep(self, value=_components(owner, self.value))
+        _keep_components(self)
 
     @property
     def title(self) -> str:
@@ -230,9 +228,7 @@ class PointForce:
 
     def __post_init__(self) -> None:
         """Check names and components."""
-        _check_names(type(self).__name__, self.where, self.name)
-        owner = f"load '{self.title}'"
-        keep(self, value=_components(owner, self.value))
+        _keep_components(self)
 
     @property
     def title(self) -> str:
@@ -245,6 +241,12 @@ def _check_names(owner: str, where: object, name: object) -> None:
     if not isinstance(where, Face):
         text(owner, "where", where)
     text(owner, "name", name, optional=True)
+
+
+def _keep_components(load: Any, *, functions: bool = True) -> None:
+    """Check the names and the components of a load and keep the components as a tuple."""
+    _check_names(type(load).__name__, load.where, load.name)
+    keep(load, value=_components(f"load '{load.title}'", load.value, functions=functions))
 
 
 def _components(owner: str, value: Any, *, functions: bool = True) -> Any:
@@ -288,9 +290,7 @@ class Moment:
 
     def __post_init__(self) -> None:
         """Check names and components."""
-        _check_names("Moment", self.where, self.name)
-        owner = f"load '{self.title}'"
-        keep(self, value=_components(owner, self.value, functions=True))
+        _keep_components(self)
 
     @property
     def title(self) -> str:
@@ -316,9 +316,7 @@ class PointMoment:
 
     def __post_init__(self) -> None:
         """Check names and components."""
-        _check_names("PointMoment", self.where, self.name)
-        owner = f"load '{self.title}'"
-        keep(self, value=_components(owner, self.value, functions=False))
+        _keep_components(self, functions=False)
 
     @property
     def title(self) -> str:

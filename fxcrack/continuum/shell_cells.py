@@ -216,9 +216,17 @@ class ShellCells:
         elif callable(axis):
             nodes = compat.geometry_dofmap(domain)[on.cells]
             x = domain.geometry.x[nodes].mean(axis=1)
-            given = np.asarray(axis(x.T), dtype=np.float64)
-            wrong = None
-            if given.shape != x.T.shape or not np.all(np.isfinite(given)):
+            given, wrong, why = np.ones_like(x.T), None, ""
+            try:
+                given = np.asarray(axis(np.ascontiguousarray(x.T)), dtype=np.float64)
+            except Exception as error:  # whatever the user's function may raise
+                why = f"{type(error).__name__}: {error}"
+            if why:
+                wrong = (
+                    f"ContinuumShell of '{self.name}': the function given as axis fails: {why}; it "
+                    f"is given positions of shape {x.T.shape}"
+                )
+            elif given.shape != x.T.shape or not np.all(np.isfinite(given)):
                 wrong = (
                     f"ContinuumShell of '{self.name}': axis gives shape {given.shape} at positions "
                     f"of shape {x.T.shape}; return finite directions of the same shape"

@@ -24,6 +24,7 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.cell_assembly import cell_vector
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
@@ -123,19 +124,17 @@ def _check_three(value: Sequence[Any], title: str) -> None:
         raise InputError(f"load '{title}': {given} components given, 3 needed")
 
 
-def _at_points(value: Field, x: Array, title: str) -> Array:
-    """A number or a function of position at points of shape (n_cells, n_points, 3)."""
+def _at_points(shell: ShellBodies, value: Field, x: Array, title: str) -> Array:
+    """A number or a function of position at points of shape (n_cells, n_points, 3); collective."""
     if not callable(value):
         return np.full(x.shape[:2], float(value))
-    found = np.asarray(value(np.ascontiguousarray(x.reshape(-1, 3).T)), dtype=float)
-    n = x.shape[0] * x.shape[1]
-    if found.shape not in ((), (n,), (1, n)):
-        raise InputError(
-            f"load '{title}': a function of position gives shape {found.shape} at {n} points; "
-            "return one number per point"
-        )
-    whole = np.broadcast_to(found.ravel() if found.size > 1 else found, (n,))
-    return np.asarray(whole.reshape(x.shape[:2]))
+    found, problem = np.zeros(x.shape[:2]), None
+    try:
+        found = numbers_at(f"load '{title}'", "value", value, x.reshape(-1, 3)).reshape(found.shape)
+    except InputError as error:  # on this rank, perhaps
+        problem = str(error)
+    raise_on_all_ranks(shell.comm, problem)
+    return found
 
 
 def _cells_of(shell: ShellBodies, part: ShellPart, where: str | None) -> Ints:
@@ -167,10 +166,10 @@ def _face_load(shell: ShellBodies, load: Traction | Pressure, face: Face) -> PET
         rows = _cells_of(shell, part, face.group)
         x = _positions(shell, part, rows)
         if isinstance(load, Traction):
-            force = np.stack([_at_points(v, x, load.title) for v in load.value], axis=-1)
+            force = np.stack([_at_points(shell, v, x, load.title) for v in load.value], axis=-1)
         else:
             side = -1.0 if face.side == "top" else 1.0
-            pressure = _at_points(load.value, x, load.title)
+            pressure = _at_points(shell, load.value, x, load.title)
             force = side * pressure[..., None] * part.axes[rows][..., 2, :]
         parts.append(_spread(shell, part, rows, force, z * force))
     return cell_vector(shell.space, parts)
@@ -182,7 +181,7 @@ def _body_force(shell: ShellBodies, load: BodyForce) -> PETSc.Vec:
     for part in shell.shell_parts:
         rows = _cells_of(shell, part, load.where)
         x = _positions(shell, part, rows)
-        force = np.stack([_at_points(v, x, load.title) for v in load.value], axis=-1)
+        force = np.stack([_at_points(shell, v, x, load.title) for v in load.value], axis=-1)
         low, high = part.section.face("bottom"), part.section.face("top")
         parts.append(
             _spread(shell, part, rows, (high - low) * force, 0.5 * (high**2 - low**2) * force)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.errors import InputError
+from fxcrack.base.errors import InputError, raise_on_all_ranks
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 
 _INSIDE = 1e-9
@@ -23,7 +24,8 @@ def starting_velocity(continuum: Continuum, velocity: Sequence[Any] | None) -> A
         velocity: A number or a function of position per component; ``None`` for bodies at rest.
 
     Raises:
-        InputError: The number of components is not that of the displacement.
+        InputError: The number of components is not that of the displacement, or a function fails or
+            gives other than one number per position.
     """
     gdim = continuum.gdim
     out = np.zeros((continuum.layout.n_owned, gdim))
@@ -31,9 +33,17 @@ def starting_velocity(continuum: Continuum, velocity: Sequence[Any] | None) -> A
         return out.ravel()
     if len(velocity) != gdim:
         raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
-    x = _positions_within(continuum).T
+    x = _positions_within(continuum)
     for c, value in enumerate(velocity):
-        out[:, c] = value(x) if callable(value) else float(value)
+        problem = None
+        try:
+            if callable(value):
+                out[:, c] = numbers_at("Inertia", f"velocity[{c}]", value, x)
+            else:
+                out[:, c] = float(value)
+        except InputError as error:  # on this rank, perhaps
+            problem = str(error)
+        raise_on_all_ranks(continuum.comm, problem)
     return out.ravel()
 
 

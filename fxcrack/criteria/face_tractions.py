@@ -10,6 +10,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InputError
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Pressure, Traction
 from fxcrack.criteria.crack_tip_fields import TipFields
@@ -294,11 +295,11 @@ _POINTS = 10
 
 def _traction(load: Traction | Pressure, x: Array, normals: Array) -> Array:
     """Traction at points with a load factor of one, shape (n, m, 3) [force/length^2]."""
-    flat, shape = x.reshape(-1, 3).T, x.shape[:2]
+    flat, shape = x.reshape(-1, 3), x.shape[:2]
 
     def at(value: Any) -> Array:
         if callable(value):
-            return np.reshape(np.asarray(value(flat), dtype=np.float64), shape)
+            return numbers_at(f"load '{load.title}'", "value", value, flat).reshape(shape)
         return np.full(shape, float(value))
 
     if isinstance(load, Pressure):

@@ -19,7 +19,7 @@ from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.criteria.probe import FrontProbe
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 Given = float | Callable[[Array], npt.ArrayLike] | None
 

@@ -16,7 +16,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.criteria.crack_closure import opens
 from fxcrack.interface.front import Front
 from fxcrack.interface.front_cells import FrontCells
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.tips import Tips
 
 State = Any

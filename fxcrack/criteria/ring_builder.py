@@ -10,6 +10,7 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.continuum.loads import BodyForce
 from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt_strain
@@ -300,8 +301,9 @@ class RingBuilder:
             force = np.zeros((*geometry.weight.shape, 3))
             for axis, value in enumerate(self._loads[k].value):
                 if callable(value):
-                    flat = geometry.x.reshape(-1, 3).T
-                    force[..., axis] = np.reshape(value(flat), geometry.weight.shape)
+                    where = f"load '{self._loads[k].title}'"
+                    found = numbers_at(where, "value", value, geometry.x.reshape(-1, 3))
+                    force[..., axis] = found.reshape(geometry.weight.shape)
                 else:
                     force[..., axis] = float(value)
             force *= cells.marks[:, column, None, None]

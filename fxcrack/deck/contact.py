@@ -31,7 +31,7 @@ from fxcrack.deck.interactions import friction, interaction, note_thickness
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
 from fxcrack.deck.supports import Boundary
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.steps.debond import Debond
 
 _RAMP = 5

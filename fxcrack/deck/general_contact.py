@@ -24,7 +24,7 @@ from fxcrack.deck.groups import Groups
 from fxcrack.deck.interactions import friction, interaction, note_thickness
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.steps.debond import Debond
 
 GENERAL = (

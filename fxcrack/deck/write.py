@@ -18,6 +18,7 @@ from fxcrack.base.checks import check_instance, check_list
 from fxcrack.base.errors import InputError, raise_on_all_ranks
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
+from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.couplings import Coupling, Equation
@@ -56,7 +57,8 @@ from fxcrack.deck.write_properties import criterion_lines, material_lines
 from fxcrack.deck.write_shells import section_lines
 from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import AnySupport
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
@@ -204,7 +206,9 @@ class _Writer:
         x[:, : self.mesh.points.shape[1]] = self.mesh.points[nodes]
         out = ["*INITIAL CONDITIONS, TYPE=VELOCITY"]
         for i, component in enumerate(self.inertia.velocity):
-            values = np.full(len(nodes), component) if not callable(component) else component(x.T)
+            values = np.full(len(nodes), component)
+            if callable(component):
+                values = numbers_at("Inertia", f"velocity[{i}]", component, x)
             out += [
                 f"{node + 1}, {i + 1}, {number(v)}"
                 for node, v in zip(nodes, values, strict=True)

@@ -8,7 +8,7 @@ from fxcrack.criteria import VCCT, Criterion, EnhancedVCCT, ProgressiveRelease, 
 from fxcrack.deck.lines import number
 from fxcrack.deck.write_properties import criterion_lines
 from fxcrack.deck.write_steps import refuse
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from fxcrack.equilibrium.coulomb import OPEN, SLIP, STICK, FrictionState
 from fxcrack.equilibrium.friction import Friction
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.front import Front
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from fxcrack.equilibrium.friction_state import has_friction, make_friction, node
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.jump_system import ComponentStates
 from fxcrack.interface.front import Front
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 Arrays = dict[str, npt.NDArray[Any]]
 

@@ -29,7 +29,7 @@ from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.criteria.criterion import Criterion
 from fxcrack.criteria.mixed_mode import total
 from fxcrack.criteria.vcct import VCCT
-from fxcrack.history import History
+from fxcrack.history import BEFORE_RELEASE, History
 from fxcrack.scene import Scene
 from fxcrack.solvers.linear import LinearSolver
 from fxcrack.steps.analysis import Analysis
@@ -207,7 +207,7 @@ def linear_response(scene: Scene, until: CrackLength, axes: Axes) -> LinearRespo
     if rates.shape[1] == 2:  # a plane has no mode III
         rates = np.column_stack((rates, np.zeros(len(rates))))
     a = history[f"a[{name}]"].astype(float)
-    onset = np.flatnonzero(history["event"] == "onset")
+    onset = np.flatnonzero(np.isin(history["event"], BEFORE_RELEASE))
     if len(onset) < 2:
         raise InputError(f"{owner}: the crack did not grow; give a larger length in until")
     _check_proportional(a, opening, load, total(rates))
@@ -275,9 +275,10 @@ def curve_of(history: History, axes: Axes) -> Curve:
     if not (released[-1] > released[0] if len(event) else False):
         raise InputError("fit: the crack did not grow in the scene; load it further")
     kept = [0]
-    if "onset" in event:
+    growth = np.isin(event, BEFORE_RELEASE)
+    if growth.any():
         size = np.abs(opening).max()
-        onset = np.flatnonzero(event == "onset").tolist()
+        onset = np.flatnonzero(growth).tolist()
         for i in onset:
             if i < kept[-1]:
                 continue

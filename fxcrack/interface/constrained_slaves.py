@@ -12,7 +12,7 @@ from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.following import Following
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 
 def drop_constrained(

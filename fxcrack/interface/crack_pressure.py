@@ -29,7 +29,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import AmplitudeLike, Field, Pressure
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.interface.surface import shape_functions
 

@@ -20,7 +20,8 @@ import scipy.sparse as sp
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.mortar import surface_weights
-from fxcrack.interface.pairing import Pair, local_frames
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.pairing import local_frames
 from fxcrack.interface.projection import project
 from fxcrack.interface.surface import FacetSurface
 

@@ -45,7 +45,10 @@ Columns of T, in this order on each rank:
 * on rank 0 only, last: retained jumps, one column per prescribed displacement component
   (u = d times its shape), and empty columns for the borders of force patterns and monitors.
 
-A fixed jump has no column: it is zero.
+A fixed jump has no column: it is zero. Where a bond has a spring of its own, a fixed or retained
+jump has an inner coordinate beside it, the elongation e of the spring
+(:mod:`fxcrack.interface.bond_springs`): R (e + delta) in place of R delta. T has more columns than
+rows then.
 
 Dofs that follow others by couplings and equations (:mod:`fxcrack.interface.following`) have no
 column of their own but rows of T with the columns of what they follow. The jump of a slave node
@@ -68,12 +71,13 @@ from scipy.sparse.csgraph import connected_components
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.interface.bond_springs import Springs, assembled_springs
 from fxcrack.interface.constrained_slaves import drop_constrained
 from fxcrack.interface.following import Following
 from fxcrack.interface.hierarchy import links_in_chain
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 FIXED, FREE, RETAINED = 0, 1, 2
@@ -96,7 +100,8 @@ class JumpCoordinates:
         n_inner: Inner coordinates of this rank.
         first: Global number of the first retained column.
         inner_dofs: Owned dof each inner coordinate belongs to, ascending; a free jump takes the
-            place of its slave node's component, shape (n_inner,).
+            place of its slave node's component, and so does an elongation, shape (n_inner,).
+        springs: Springs of bonds, of this rank's elongations, per pair that has some.
     """
 
     transform: PETSc.Mat
@@ -109,6 +114,7 @@ class JumpCoordinates:
     n_inner: int
     first: int
     inner_dofs: Ints
+    springs: tuple[Springs, ...] = ()
 
     @property
     def n_last(self) -> int:
@@ -139,6 +145,7 @@ def build_coordinates(
     roles: Sequence[npt.NDArray[np.int8]],
     supports: Supports,
     n_borders: int,
+    springs: Sequence[Array | None] = (),
 ) -> JumpCoordinates:
     """Number the coordinates and build T; collective.
 
@@ -148,6 +155,8 @@ def build_coordinates(
         roles: FIXED, FREE or RETAINED per pair and jump component, shape (n_nodes, gdim).
         supports: Prescribed components.
         n_borders: Empty columns to append.
+        springs: Stiffness of the bonds in global axes per pair, shape (n_nodes, gdim, gdim),
+            force/length, or ``None`` where they are exact; exact everywhere by default.
 
     Raises:
         InterfaceError: A slave used twice, a cycle of slaves and masters, a support on a slave
@@ -183,6 +192,11 @@ def build_coordinates(
         prescribed.append(rows)
     frames, held = align_frames(pairs, prescribed, jumped, supports, gdim)
     held = [h | r[:, None] for h, r in zip(held, rigid, strict=True)]
+    springs = list(springs) or [None] * len(pairs)
+    elastic = [
+        (r != FREE) & ~h & j[:, None] & (k is not None)
+        for r, h, j, k in zip(roles, held, jumped, springs, strict=True)
+    ]
     roles = [
         np.where(h | ~j[:, None], FIXED, r) for r, h, j in zip(roles, held, jumped, strict=True)
     ]
@@ -196,9 +210,9 @@ def build_coordinates(
         own[constrained] = False
     follows = joined  # other dofs, by T
     free_jump = np.zeros_like(follows)
-    for link, role in zip(links, roles, strict=True):
+    for link, role, yields in zip(links, roles, elastic, strict=True):
         follows[link.nodes, :gdim] = True
-        free_jump[link.nodes, :gdim] = role[link.slaves] == FREE
+        free_jump[link.nodes, :gdim] = ((role == FREE) | yields)[link.slaves]
     local = layout.dofs(nodes.local)
     follows_here = follows[nodes.mine]
     own[local[follows_here]] = free_jump[nodes.mine][follows_here]
@@ -252,7 +266,40 @@ def build_coordinates(
     return JumpCoordinates(
         transform, frames, held, index, n_retained, n_supports, n_borders, n_inner, first,
         np.flatnonzero(own),
+        _springs(layout, nodes, links, frames, springs, elastic, column),
     )  # fmt: skip
+
+
+def _springs(
+    layout: DofLayout,
+    nodes: InterfaceNodes,
+    links: Sequence[_Link],
+    frames: Sequence[Array],
+    springs: Sequence[Array | None],
+    elastic: Sequence[Bools],
+    column: Ints,
+) -> tuple[Springs, ...]:
+    """Springs of the bonds whose elongations are coordinates of this rank.
+
+    Args:
+        layout: Unknowns of nodes and their numbers.
+        nodes: The interface nodes.
+        links: Slave nodes that have a jump, per pair.
+        frames: Frames of slave nodes per pair, shape (n_nodes, gdim, gdim).
+        springs: Stiffness in global axes per pair, shape (n_nodes, gdim, gdim), or ``None``.
+        elastic: Components that have an elongation per pair, shape (n_nodes, gdim).
+        column: Column of each owned dof's own, shape (n_local,).
+    """
+    out = []
+    for link, frame, stiffness, yields in zip(links, frames, springs, elastic, strict=True):
+        if stiffness is None:
+            continue
+        dofs = nodes.nodes[link.nodes]
+        k = link.slaves[layout.is_owned(dofs)]
+        local = layout.dofs(layout.to_local(dofs[layout.is_owned(dofs)]))[:, : layout.gdim]
+        own = np.where(yields[k], column[local], -1)
+        out.append(assembled_springs(stiffness[k], frame[k], own))
+    return tuple(out)
 
 
 @dataclass(frozen=True)
@@ -325,10 +372,10 @@ def _interface_rows(
         k, s = link.slaves, link.nodes
         followed += _followed_unknowns(nodes, link, support[s] < 0)
         for j in range(layout.gdim):
-            target = np.where(jumps[k, j] >= 0, jumps[k, j], column[s, j])
-            has = target >= 0
-            for c in range(layout.gdim):
-                entries.append((layout.dof(s[has], c), target[has], frame[k, c, j][has]))
+            for target in (jumps[k, j], column[s, j]):  # both: a retained jump and its elongation
+                has = target >= 0
+                for c in range(layout.gdim):
+                    entries.append((layout.dof(s[has], c), target[has], frame[k, c, j][has]))
 
     def matrix(parts: list[tuple[Ints, Ints, Array]], width: int) -> sp.csr_matrix:
         r, c, v = (np.concatenate(p) for p in zip(*parts, strict=True))

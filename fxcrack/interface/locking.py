@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from fxcrack.base import compat, log
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 _SLENDER = 3.0
 """Root of the area of an interface over the mean height of the bodies on either side of it, from

@@ -33,7 +33,7 @@ from fxcrack.base.errors import InterfaceError
 from fxcrack.base.sparse import Product, by_component
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports, align_frames, check_slaves
 
 

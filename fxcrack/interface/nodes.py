@@ -17,7 +17,7 @@ import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.dof_layout import DofLayout
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.surface import FacetSurface
 
 

@@ -22,7 +22,7 @@ from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry, 
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.interface.following import Following, collect_following
 from fxcrack.interface.nodes import InterfaceNodes
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 AnySupport = Displacement | Support | Constraint
 

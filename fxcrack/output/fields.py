@@ -20,7 +20,7 @@ from fxcrack.base.parallel import all_or_none
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.stress import cell_stress, von_mises
 from fxcrack.history import Row
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.output.interface_fields import InterfaceFields, in_space, interface_fields
 from fxcrack.output.shell_fields import shell_grid
 from fxcrack.output.vtu import FACETS, Grid, write_grid, write_header, write_series

@@ -8,8 +8,8 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, unknown_name
+from fxcrack.interface.definition import Interface
 from fxcrack.interface.front_order import ordered_fronts
-from fxcrack.interface.pairing import Interface
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.mesh import Mesh
 from fxcrack.steps.analysis import Analysis
 

@@ -42,6 +42,8 @@ class CondensedBodies:
             return "shells"
         if continuum.founded:
             return "stabilise"
+        if any(p.interface.stiffness is not None for p in self._solver.pairs):
+            return "bonds with a stiffness"
         if forms is None:
             return ""
         if forms.dynamic:

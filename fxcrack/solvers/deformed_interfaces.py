@@ -9,13 +9,14 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.equilibrium.cohesive_bonds import CohesiveBonds
 from fxcrack.interface.finite_sliding import CHANGING, changing, renewed, with_changing
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 from fxcrack.interface.nodes import JumpGather
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.surface import gather_surface
 from fxcrack.solvers.increment_work import IncrementWork
 
@@ -103,7 +104,7 @@ class DeformedInterfaces:
         """What renewed pairings have changed, per pair; the same on any number of ranks.
 
         Returns:
-            Arrays by name, those of :class:`~fxcrack.interface.pairing.Pair` and of their shapes:
+            Arrays by name, those of :class:`~fxcrack.interface.pair.Pair` and of their shapes:
             paired and gap, shape (n_nodes,), masters (nodes of the master surface) and weights,
             shape (n_nodes, k), frames, shape (n_nodes, gdim, gdim).
         """
@@ -123,6 +124,21 @@ class DeformedInterfaces:
             if master is not None:
                 known = {name: arrays[key.format(name, p)] for name in CHANGING}
                 self._pairs[p] = with_changing(self._pairs[p], master, known)
+
+
+def pulling(index: list[Ints], force: Array, soft: CohesiveBonds) -> list[Bools]:
+    """Nodes per pair whose bonds are released but still carry a force, shape (n_nodes,).
+
+    Args:
+        index: Number of each retained jump per pair, shape (n_nodes, gdim), -1 where there is none.
+        force: Given forces, shape (n_retained,), force.
+        soft: Softening bonds.
+    """
+    carried = np.append(force != 0.0, False)
+    out = [carried[numbers].any(axis=1) for numbers in index]
+    for bond in soft.bonds:
+        out[bond.where[0]][bond.where[1]] = True
+    return out
 
 
 class PairingEnergy:
@@ -172,4 +188,4 @@ class PairingEnergy:
             self._before = None
 
 
-__all__ = ["DeformedInterfaces", "PairingEnergy"]
+__all__ = ["DeformedInterfaces", "PairingEnergy", "pulling"]

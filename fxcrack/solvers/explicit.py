@@ -40,15 +40,17 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import global_vectors
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair, local_frames
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.explicit_accounts import EnergyAccounts
 from fxcrack.solvers.explicit_bodies import BodyMotion
-from fxcrack.solvers.explicit_elastic import ElasticBonds
-from fxcrack.solvers.explicit_energies import MotionEnergies, stored_energies, sums_over_ranks
+from fxcrack.solvers.explicit_energies import MotionEnergies, sums_over_ranks
 from fxcrack.solvers.explicit_further import FurtherForces
-from fxcrack.solvers.explicit_interface import InterfaceDynamics
+from fxcrack.solvers.explicit_interface import dynamics_of
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
+from fxcrack.solvers.explicit_moving import MovingInterfaces
+from fxcrack.solvers.explicit_outer import OuterForces
 from fxcrack.solvers.explicit_present import PresentInterface
 from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
 from fxcrack.solvers.explicit_stability import Stability
@@ -112,18 +114,15 @@ class ExplicitSolver:
         self.bodies = InternalForces(continuum, [t for t in terms if t not in following])
         self._effect = effect
         self.further = FurtherForces(continuum, following, self.bodies.u)
-        self._further: Array | None = None
         self.mass = ScaledMass(lumped_mass(continuum, effect))
         self._velocity = starting_velocity(continuum, effect.velocity)
         self._velocity_whole = True  # at interface nodes as well
-        self._loads_before: Array | None = None
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
-        self._damping = float(effect.rayleigh[0])
         self.energies = MotionEnergies(self.comm)
         self.monitored: list[float] = []
-        self._outer = LoadsAndMonitors(continuum, loads, monitors)
+        self._patterns = LoadsAndMonitors(continuum, loads, monitors)
         self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass.values)
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
@@ -131,6 +130,14 @@ class ExplicitSolver:
         chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
         self.motion = BodyMotion(self.bodies, chosen)
+        damping = float(effect.rayleigh[0])
+        self._outer = OuterForces(
+            self._patterns, self.further, self.mass, damping, chosen, self.energies
+        )
+        self._accounts = EnergyAccounts(
+            self.bodies, self.motion, self.mass, self.dynamics, self._patterns, pairs,
+            self.energies, damped=damping > 0.0,
+        )  # fmt: skip
         # coordinates at the start of the present increment and at its end
         self._now: Array | None = None
         self._then = np.zeros(self.n_loads)
@@ -145,27 +152,15 @@ class ExplicitSolver:
         nodes = lumped.nodes
         self.row_of = lumped.row_of
         self.frames, self.held_by_supports = lumped.pair_frames, lumped.pair_held
-        for pair, front, held in zip(self.pairs, self.fronts, self.held_by_supports, strict=True):
-            front.tied = held.all(axis=1) | (pair.bonded & ~pair.paired)
-        self.index = []
-        for rows, held in zip(self.row_of, self.held_by_supports, strict=True):
-            numbers = gdim * rows[:, None] + np.arange(gdim)
-            self.index.append(np.where((rows >= 0)[:, None] & ~held, numbers, -1))
-        bonded = np.zeros(lumped.n_rows, dtype=bool)
-        for front, rows in zip(self.fronts, self.row_of, strict=True):
-            has = rows >= 0
-            bonded[rows[has]] = front.bonded[has]
-        elastic = ElasticBonds(lumped, self.pairs, self.continuum)
-        sprung = np.any(elastic.local > 0.0, axis=1)
-        elastic.active = bonded & sprung
-        self._has_elastic = bool(sprung.any())
-        self.dynamics = InterfaceDynamics(lumped, self.pairs, bonded & ~sprung, elastic)
+        self.dynamics = dynamics_of(lumped, self.pairs, self.fronts, self.continuum)
+        self._moving = MovingInterfaces(self.dynamics, self.pairs, self.fronts)
         self._mine = nodes.mine
         self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
         self._present = PresentInterface(lumped, self.dynamics)
+        self.index = self._present.index
         self.stability = Stability(self.bodies, self.dynamics, self.further, self._at_interface)
         self._at_nodes = np.zeros(gdim * len(nodes))
-        self._has_face_loads = self._outer.take_faces(lumped)
+        self._has_face_loads = self._patterns.take_faces(lumped)
         self.dynamics.v = nodes.gather(self._velocity)
 
     @property
@@ -199,10 +194,10 @@ class ExplicitSolver:
         self.energies.is_viscous |= self.stability.take_viscosity(options, self._effect)
         self.stable = self.stability.find(self.mass.values, self.velocity)
         self.motion.prepare(self.mass.inverse)
-        self._outer.divide(self._chosen, self.mass.inverse)
+        self._outer.prepare()
         self.dt = chosen_increment(options, self.stable)
         self.timings.add("stable increment", start)
-        self.dynamics.penalty = options.penalty if options.contact == "penalty" else None
+        self.dynamics.open_pairs.penalty = options.penalty if options.contact == "penalty" else None
         if self.increments == 0:
             self._start(coordinates)
 
@@ -214,16 +209,7 @@ class ExplicitSolver:
 
     def follow_bodies(self) -> None:
         """Take front geometry and contact normals of bodies that move far; collective."""
-        lumped, gdim = self.lumped, self.continuum.gdim
-        for p, (front, rows) in enumerate(zip(self.fronts, self.row_of, strict=True)):
-            x = self.pairs[p].surface.x.copy()
-            has = rows >= 0
-            x[has, :gdim] += self.dynamics.u[lumped.slave[rows[has]]]
-            front.follow(x)
-            frames = local_frames(-front.surface.normals, gdim)
-            lumped.frames[rows[has]] = frames[has]
-        lumped.version += 1
-        self.dynamics.set_frames()
+        self._moving.follow()
 
     def renew_stable_increment(self) -> float:
         """The stable increment with the present tangent, by a few more steps; collective."""
@@ -244,9 +230,9 @@ class ExplicitSolver:
         self.bodies.u.x.scatter_forward()
         self.dynamics.u = self.lumped.nodes.gather(u[: self.continuum.n_local])
         self.lumped.follow(self.dynamics.v)
-        self._loads = coordinates[len(self.supports.columns) :]
+        self._outer.factors = coordinates[len(self.supports.columns) :]
         self.bodies.begin(self.at)
-        self.energies.heated = self._thermal_part()
+        self.energies.heated = self._accounts.thermal_part(*self._middle())
         self.energies.initial = sum(self.stored_now().values())
 
     # -- one increment -------------------------------------------------------------------
@@ -262,7 +248,7 @@ class ExplicitSolver:
         columns = len(self.supports.columns)
         self._h = 0.5 * (self.last_dt + self.dt)
         self._now, self._then = now, then
-        self._loads, self._coordinates = now[columns:], then[:columns]
+        self._outer.factors, self._coordinates = now[columns:], then[:columns]
         chosen = self._at_chosen
         self.bodies.begin(self.at)
         self.motion.forces(chosen, self._h)
@@ -270,13 +256,8 @@ class ExplicitSolver:
         np.negative(chosen, out=chosen)
         if self.dt != self.last_dt:
             self._internal = self.motion.whole()
-        self._outer.add_at_chosen(chosen, self._loads)
-        if self.further.exist:
-            self._further = self.further.find(self.at, self.velocity)
-            chosen += self._further[self._chosen]
-        if self._damping:
-            at = self._chosen
-            chosen -= self._damping * self.mass.values[at] * self.velocity[at]
+        velocity = self.velocity if self._outer.needs_velocity else self._velocity
+        self._outer.begin(chosen, self.at, velocity)
         t1 = clock.perf_counter()
         if len(self.lumped.nodes):
             mine = chosen[: len(self._at_interface)]
@@ -309,56 +290,39 @@ class ExplicitSolver:
         if not self._has_face_loads:
             return None
         out = np.zeros_like(self._present.jumps)
-        out[:-1] = self._outer.on_faces(self._loads)
+        out[:-1] = self._patterns.on_faces(self._outer.factors)
         return out
 
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
         start = clock.perf_counter()
         h, dt, u = self._h, self.dt, self._owned
-        prescribed, dynamics, energies = self.prescribed, self.dynamics, self.energies
+        prescribed, dynamics, outer = self.prescribed, self.dynamics, self._outer
         given = prescribed.velocities(u, self._coordinates, dt)
         reactions = self._reactions_to(given)
         at, mine = self._at_interface, self._mine
         # loads, damping and changes of the increment look at all dofs
-        further = self._further if self.further.exist else None
-        whole = bool(self.loads) or self._damping > 0.0 or dt != self.last_dt
-        whole |= further is not None
+        whole = outer.exist or dt != self.last_dt
         v = self.velocity if whole else self._velocity
         before = v.copy() if whole else v
         old = prescribed.motion(v, dynamics.v)
         if dynamics.elastic.exist and dt != self.last_dt:
             self._interface_before, self._jumps_before = dynamics.v.copy(), dynamics.gap
-        if self._damping:
-            v *= 1.0 - h * self._damping
+        outer.damp(v, h)
         self.motion.add_change(v)
-        self._outer.add_elsewhere(v, self._loads, h)
-        if further is not None:
-            v += h * self.mass.inverse * further
+        outer.push(v, h)
         dynamics.advance(h, dt)
         v[prescribed.dofs] = given
         if whole and len(at):
             v[at] = dynamics.v[mine].ravel()
         power = float(reactions @ (old + prescribed.motion(v, dynamics.v)))
-        if self.loads:
-            power += self._outer.power(self._loads, before)
-            power += self._outer.power(self._loads, v)
-        if further is not None:
-            power += energies.take_further(self.further, before + v, h)
-        energies.work += 0.5 * h * power
-        if self._damping:
-            rate = 0.5 * h * self._damping
-            energies.damped += rate * float((before * self.mass.values) @ (before + v))
+        if whole:
+            power += outer.power(before, v, h)
+        self.energies.work += 0.5 * h * power
         if dt != self.last_dt:
-            # U of linear bodies is u^n . f_int(u^{n+1})/2: it changes with the length of increments
-            more = 0.25 * (dt - self.last_dt) * float(self._internal @ (v - before))
-            more = sums_over_ranks(self.comm, more)[0]
-            more += self._of_elastic_bonds(dt)
-            if self.increments:
-                energies.renewed -= more
-            else:
-                energies.initial += more
-        self._velocity_whole, self._loads_before = whole, self._loads
+            self._take_change(v - before)
+        self._velocity_whole = whole
+        outer.end()
         add_multiple(u, dt, v)
         if len(at):
             u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
@@ -370,14 +334,22 @@ class ExplicitSolver:
         self._present.forget()
         self.seconds["update"] += clock.perf_counter() - start
 
-    def _of_elastic_bonds(self, dt: float) -> float:
-        """What a change of the increment does to the energy of elastic bonds."""
-        dynamics = self.dynamics
-        if not dynamics.elastic.exist:
-            return 0.0
-        change = dynamics.v - self._interface_before
-        pull = dynamics.elastic.forces(self._jumps_before)
-        return -0.25 * (dt - self.last_dt) * float(np.vdot(pull, self.lumped.jumps(change)))
+    def _take_change(self, more: Array) -> None:
+        """Account for a change of the increment, with which the middle of increments moves.
+
+        U of linear bodies is u^n . f_int(u^{n+1})/2, that of elastic bonds likewise; the work of
+        f_int in the increment is the change of U less (dt - last dt)/4 f_int . more.
+
+        Args:
+            more: Change of the velocity, owned dofs, shape (n_local,), length/time.
+        """
+        change, dynamics = 0.25 * (self.dt - self.last_dt), self.dynamics
+        gone = sums_over_ranks(self.comm, change * float(self._internal @ more))[0]
+        if dynamics.elastic.exist:
+            pull = dynamics.elastic.forces(self._jumps_before)
+            jumps = self.lumped.jumps(dynamics.v - self._interface_before)
+            gone -= change * float(np.vdot(pull, jumps))
+        self.energies.take_change(gone, first=not self.increments)
 
     def reactions(self) -> Array:
         """Reactions of the prescribed dofs of this rank, in the order of :attr:`prescribed`.
@@ -399,30 +371,16 @@ class ExplicitSolver:
 
     # -- energies ------------------------------------------------------------------------
 
+    def _middle(self) -> tuple[Array, float, Array]:
+        """Velocity, length and load factors of the last increment, in its middle."""
+        return self.velocity, self.last_dt, self._outer.mean_factors
+
     def stored_now(self) -> dict[str, float]:
         """Strain and kinetic energy in the middle of the last increment; collective.
 
         Before the first increment they are those of the start.
         """
-        out = stored_energies(self.bodies, self.motion, self.mass, self.velocity, self.last_dt)
-        out["kinetic_energy"] += self.lumped.excess_energy(self.dynamics.v)
-        out["strain_energy"] -= self._thermal_part()
-        if self._has_elastic:
-            out["bond_energy"] = self.dynamics.stored()
-        return out
-
-    def _thermal_part(self) -> float:
-        """What the temperature of linear bodies takes off 1/2 u K u to give what is stored.
-
-        In the middle of the last increment; collective.
-        """
-        if not self._outer.n_thermal:
-            return 0.0
-        before = self._loads if self._loads_before is None else self._loads_before
-        n = self.continuum.n_local
-        u = self.bodies.u.x.array[:n] - 0.5 * self.last_dt * self.velocity
-        answers = sums_over_ranks(self.comm, *self._outer.conjugates(u))
-        return self._outer.thermal_part(0.5 * (before + self._loads), np.array(answers))
+        return self._accounts.stored(*self._middle())
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies, by name, of the present state; collective."""
@@ -430,29 +388,14 @@ class ExplicitSolver:
 
     def spent(self) -> dict[str, float]:
         """Energies that have left the bodies, by name; collective."""
-        energies = self.dynamics.energies
-        out = {"released_energy": energies.bonds}
-        if any(pair.interface.contact for pair in self.pairs):
-            out["contact_energy"] = energies.contact
-        if any(pair.friction is not None for pair in self.pairs):
-            out["friction_energy"] = energies.friction
-        if not self.lumped.simple:
-            out["tie_energy"] = energies.ties
-        if self.energies.renewed:
-            out["dt_energy"] = self.energies.renewed
-        if self._damping:
-            out["damping_energy"] = self.energies.totals()[1]
-        if self.energies.is_viscous:
-            out["viscous_energy"] = self.energies.totals()[2]
-        return out | self.bodies.spent()
+        return self._accounts.spent()
 
     def external_work(self) -> float:
         """Work of supports, loads and temperature up to the middle of the last increment.
 
         Collective.
         """
-        heat = self.energies.heated - self._thermal_part()
-        return self.energies.totals()[0] + heat + self.bodies.work()
+        return self._accounts.external_work(*self._middle())
 
     # -- going back, and checkpoints -----------------------------------------------------
 
@@ -478,7 +421,7 @@ class ExplicitSolver:
         self.dynamics.v = self.lumped.nodes.gather(self.velocity)
         saved.interfaces.restore(self.dynamics)
         self.bodies.restore(saved.bodies)
-        self._loads_before = None
+        self._outer.forget()
         if saved.coordinates is not None:
             self.begin(*saved.coordinates)
 
@@ -492,10 +435,7 @@ class ExplicitSolver:
         """
         self.record_state()
         out = self._files.arrays(self.remember()) | {"loads": self.state.loads}
-        for p, (front, index) in enumerate(zip(self.fronts, self.index, strict=True)):
-            out[f"bonded[{p}]"] = front.bonded
-            out[f"jump[{p}]"] = np.append(self.state.jump, 0.0)[index]
-        return out
+        return out | self._present.arrays(self.fronts, self.state.jump)
 
     def resume(self, arrays: Arrays, time: float) -> None:
         """Take a state that :meth:`collect` gave; collective.
@@ -519,19 +459,14 @@ class ExplicitSolver:
     def record_state(self) -> None:
         """Take the present loads, reactions, jumps and forces as :attr:`state`; collective."""
         assert self._now is not None
-        lumped, columns = self.lumped, len(self.supports.columns)
+        columns = len(self.supports.columns)
         u = self.bodies.u.x.array[: self.continuum.n_local]
         reactions = self.prescribed.by_column(self.reactions(), columns)
-        conjugate = [*reactions.tolist(), *self._outer.conjugates(u)]
-        sums = sums_over_ranks(self.comm, *conjugate, *self._outer.monitored(u))
+        conjugate = [*reactions.tolist(), *self._patterns.conjugates(u)]
+        sums = sums_over_ranks(self.comm, *conjugate, *self._patterns.monitored(u))
         self.monitored = sums[len(conjugate) :]
-        jumps = np.einsum("nci,nc->ni", lumped.frames, self.jumps[:-1])
-        force = np.zeros_like(jumps)
-        force[lumped.open] = self.dynamics.open_forces()
-        force = np.einsum("nci,nc->ni", lumped.frames, force)
-        self.state = Equilibrium(
-            self._now, force.ravel(), jumps.ravel(), np.array(sums[: len(conjugate)])
-        )
+        force, jumps = self._present.in_frames()
+        self.state = Equilibrium(self._now, force, jumps, np.array(sums[: len(conjugate)]))
 
     def about(self) -> dict[str, Any]:
         """What is worth keeping with a history, plain types."""

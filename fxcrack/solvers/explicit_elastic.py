@@ -18,7 +18,7 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.cell_stiffness import moduli_at_nodes
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 
 class ElasticBonds:

@@ -64,6 +64,18 @@ class MotionEnergies:
             self.viscous -= 0.5 * h * float(forces.viscous @ motion)
         return 0.0 if forces.pressures is None else float(forces.pressures @ motion)
 
+    def take_change(self, gone: float, *, first: bool) -> None:
+        """Count the energy that a change of the increment moves out of the middle of increments.
+
+        Args:
+            gone: The energy, that of all ranks.
+            first: Whether it is the first increment, which begins at half its length.
+        """
+        if first:
+            self.initial += gone
+        else:
+            self.renewed -= gone
+
     def totals(self) -> Totals:
         """Work, damping, viscosity, energy at the start, gone with dt, of heat; collective."""
         work, damped, viscous = sums_over_ranks(self._comm, self.work, self.damped, self.viscous)

@@ -12,71 +12,30 @@ few sweeps over all of them. Work counts with the mean velocity of the increment
 all energies stays what it was, whatever the forces are.
 
 Most increments need little of this: softening bonds are solved alone, and only where a pair would
-overlap afterwards are all open pairs looked at (:meth:`InterfaceDynamics._general`).
+overlap afterwards are all open pairs looked at (:mod:`fxcrack.solvers.explicit_open_pairs`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.sparse import Product
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.interface.front import Front
 from fxcrack.interface.lumped import LumpedInterface
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
+from fxcrack.solvers.explicit_acting import ActingForces, InterfaceEnergies
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
 from fxcrack.solvers.explicit_elastic import ElasticBonds
-from fxcrack.solvers.explicit_faces import (
-    SWEEPS,
-    FaceForces,
-    OpenFaces,
-    find_forces,
-    total_forces,
-    without_gain,
-)
+from fxcrack.solvers.explicit_open_pairs import FreeMotion, OpenPairs
 from fxcrack.solvers.explicit_softening import LiveBonds
 
 _LEFT = 1e-6
 """Energy left to an elastic bond over that it had stored, below which it is free at once."""
-
-
-@dataclass
-class InterfaceEnergies:
-    """Energy that has left the bodies through the interfaces, force times length.
-
-    Attributes:
-        bonds: Spent by bonds that are released.
-        contact: Lost where faces meet.
-        friction: Dissipated by friction.
-        ties: Kinetic energy of row sums beyond that of the nodes, gone with released ties.
-    """
-
-    bonds: float = 0.0
-    contact: float = 0.0
-    friction: float = 0.0
-    ties: float = 0.0
-
-
-@dataclass
-class _Acting:
-    """Forces on the slave side of the open rows in the present increment, by what they are.
-
-    Attributes:
-        softening: Forces of the live bonds, tension positive, shape (n_live,).
-        fading: Rows among the open ones, and forces, of bonds that fade.
-        contact: Likewise, of faces that touch; normal forces.
-        friction: Likewise, tangential forces.
-        total: Sum of all, shape (n_open, gdim); ``None`` where only live bonds act, or nothing.
-    """
-
-    softening: Array | None = None
-    fading: tuple[Ints, Array] | None = None
-    contact: tuple[Ints, Array] | None = None
-    friction: tuple[Ints, Array] | None = None
-    total: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -107,7 +66,7 @@ class InterfaceDynamics:
     Attributes:
         fading: Bond forces that fall with time.
         energies: What has left the bodies through the interfaces.
-        penalty: Stiffness of contact over m/dt^2 of the pair; ``None``: by multipliers.
+        open_pairs: Contact and friction of the pairs that are not tied.
     """
 
     def __init__(
@@ -125,20 +84,12 @@ class InterfaceDynamics:
         self._bonds = SofteningBonds.none(lumped.n_rows, gdim)
         self.fading: list[Fading] = []
         self.energies = InterfaceEnergies()
-        self.penalty: float | None = None
-        self._touches = np.zeros(lumped.n_rows, dtype=bool)
-        self._friction = np.zeros(lumped.n_rows)
-        for pair, rows in zip(pairs, lumped.row_of, strict=True):
-            has = rows >= 0
-            self._touches[rows[has]] = pair.interface.contact
-            if pair.friction is not None:
-                self._friction[rows[has]] = pair.friction[has]
+        self.open_pairs = OpenPairs(lumped, pairs)
         self._fixed = np.flatnonzero(lumped.which.ravel() >= 0)
         self._fixed_column = lumped.which.ravel()[self._fixed]
         self._fixed_value = lumped.value.ravel()[self._fixed]
         self._h = self._dt = 1.0
-        self._warned_of_sweeps = False
-        self._acting = _Acting()
+        self._acting = ActingForces()
         self.set_ties(tied)
 
     # -- motion --------------------------------------------------------------------------
@@ -208,25 +159,8 @@ class InterfaceDynamics:
 
     def set_frames(self) -> None:
         """Take the frames of the rows, which have turned, and prepare what depends on them."""
-        lumped = self.lumped
-        rows = lumped.open
         self.elastic.renew()
-        self._normal = lumped.frames[rows][:, :, 0]
-        self._compliance = np.einsum("nc,nc->n", lumped.compliance, self._normal**2)
-        scale = self._compliance.max(initial=0.0)
-        # prescribed on all sides along the normal: no force could keep such a pair apart
-        may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
-        may_touch &= ~self.elastic.active[rows]
-        self._may_touch = np.flatnonzero(may_touch)
-        self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
-        self._has_gap = bool(np.any(lumped.gap[rows]))
-        self._closing_gap = lumped.gap[rows[self._may_touch]]
-        self._gaps = np.zeros(len(self._may_touch))
-        self._faces = OpenFaces(
-            self._normal, lumped.gap[rows] if self._has_gap else None, self._may_touch,
-            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.simple,
-        )  # fmt: skip
-        self._last_found: FaceForces | None = None
+        self.open_pairs.renew(self.elastic.active)
         self._soften()
 
     def _soften(self) -> None:
@@ -326,22 +260,27 @@ class InterfaceDynamics:
             self._given = ((target - self._u[self._fixed]) / dt - self._v[self._fixed]) / h
             self._fixed_push.add(self._given, a)
         x, y = self._free_motion()
-        self._acting = acting = _Acting()
+        self._acting = acting = ActingForces()
         if not len(lumped.open):
             return
-        if not self.fading and self.penalty is None:
+        if not self.fading and self.open_pairs.penalty is None:
             live = self._live
             if len(live):
                 acting.softening = pull = live.forces(self._u, x, dt * h)
                 live.push.add(-h * pull, y)
                 live.push.add((-h * dt) * pull, x)
-            if not self._overlaps(x):
+            if not self.open_pairs.overlap(x):
                 if acting.softening is not None and not lumped.simple:
                     self._more = lumped.on_nodes(self._of_live(acting.softening)).ravel()
                 return
             if acting.softening is not None:
                 self._free_motion()
-        self._acting = acting = self._general(h, dt)
+        motion = FreeMotion(
+            self.gap, lumped.jumps(self.v), lumped.jumps(x.reshape(self._shape)), h, dt
+        )
+        self._acting = acting = self.open_pairs.forces(
+            self._live, self.fading, self._place, motion
+        )  # fmt: skip
         if acting.total is not None:
             self._more = lumped.on_nodes(acting.total).ravel()
             more = lumped.accelerations.into(self._more, self._work)
@@ -358,112 +297,10 @@ class InterfaceDynamics:
         self._x += self._u
         return self._x, self._y
 
-    def _overlaps(self, x: Array) -> bool:
-        """Whether a pair in contact would overlap at a displacement, shape (n_nodes gdim,)."""
-        if not len(self._may_touch):
-            return False
-        gaps = self._closing.into(x, self._gaps)
-        if self._has_gap:
-            gaps += self._closing_gap
-        return bool(gaps.min() < 0.0)
-
     def _of_live(self, pull: Array) -> Array:
         """Forces of the live bonds on the slave side of the open rows, shape (n_open, gdim)."""
         out = np.zeros((len(self.lumped.open), self._shape[1]))
         out[self._soft] = -pull[:, None] * self._live.direction
-        return out
-
-    def _general(self, h: float, dt: float) -> _Acting:
-        """All forces between the faces of open pairs."""
-        lumped, acting = self.lumped, _Acting()
-        free = lumped.jumps(self._x.reshape(self._shape))
-        given = self._fading_forces(acting, dt)
-        if given is not None:
-            free = free + dt * h * lumped.response(given)
-        if self.penalty is None:
-            found = self._by_multipliers(acting, free, dt * h)
-        else:
-            found = self._by_penalty(acting, free, dt * h)
-        if given is not None:
-            found = given if found is None else found + given
-        acting.total = found
-        return acting
-
-    def _fading_forces(self, acting: _Acting, dt: float) -> Array | None:
-        """Forces of bonds that fall with time, shape (n_open, gdim)."""
-        if not self.fading:
-            return None
-        rows, forces = [], []
-        for f in self.fading:
-            rows.append(self._place[f.rows])
-            forces.append(f.left(dt) * f.force)
-        at, force = np.concatenate(rows), np.concatenate(forces)
-        acting.fading = at, force
-        out = np.zeros((len(self.lumped.open), self._shape[1]))
-        out[at] += force
-        return out
-
-    def _by_multipliers(self, acting: _Acting, free: Array, hh: float) -> Array | None:
-        """Softening forces, exact contact and friction, (n_open, gdim); ``None``: there is none.
-
-        Args:
-            acting: Filled in.
-            free: Jumps at the end without these forces, shape (n_open, gdim), length.
-            hh: dt h.
-        """
-        soft, live, faces = self._soft, self._live, self._faces
-        gap = self.gap
-        found = find_forces(faces, live, soft, gap, free, hh, self._last_found)
-        if not faces.separate:
-            self._last_found = found
-        if not len(soft) and not len(found.touch):
-            return None
-        if not found.settled:
-            self._calm(found, gap, free)
-        if len(soft):
-            acting.softening = found.strength
-        touch = found.touch
-        if len(touch):
-            acting.contact = touch, found.pressure[touch, None] * self._normal[touch]
-            if faces.rough:
-                acting.friction = touch, found.holding[touch]
-        return total_forces(faces, live, soft, found.strength, found.pressure, found.holding)
-
-    def _calm(self, found: FaceForces, gap: Array, free: Array) -> None:
-        """Take of forces that do not agree a part that adds no energy, and say so once."""
-        faces, live, soft = self._faces, self._live, self._soft
-        none = np.zeros_like(found.pressure)
-        pulled = total_forces(faces, live, soft, found.strength, none, 0.0 * found.holding)
-        after = (free - gap) / self._dt + self._h * faces.response(pulled)
-        between = found.pressure[:, None] * faces.normal + found.holding
-        before = self.lumped.jumps(self.v)
-        part = without_gain(faces, between, before, after, self._h)
-        found.pressure, found.holding = part * found.pressure, part * found.holding
-        if not self._warned_of_sweeps:
-            self._warned_of_sweeps = True
-            log.warn(
-                "explicit dynamics: forces between faces that touch did not settle in %d sweeps of "
-                "an increment; of these forces the part is taken that adds no energy, %.3g",
-                SWEEPS,
-                part,
-            )
-
-    def _by_penalty(self, acting: _Acting, free: Array, hh: float) -> Array | None:
-        """Softening forces, and contact by a stiffness on present overlaps."""
-        assert self.penalty is not None
-        faces, may = self._faces, self._may_touch
-        self._faces = replace(faces, may_touch=may[:0])
-        forces = self._by_multipliers(acting, free, hh)
-        self._faces = faces
-        overlap = np.minimum(faces.normal_gaps(self.gap)[may], 0.0)
-        touch, overlap = may[overlap < 0.0], overlap[overlap < 0.0]
-        if not len(touch):
-            return forces
-        stiffness = self.penalty / (hh * self._compliance[touch])
-        push = (stiffness * -overlap)[:, None] * self._normal[touch]
-        acting.contact = touch, push
-        out = np.zeros_like(free) if forces is None else forces
-        out[touch] += push
         return out
 
     def advance(self, h: float, dt: float) -> None:
@@ -476,7 +313,7 @@ class InterfaceDynamics:
         acting = self._acting
         if acting.total is not None:
             mean = (0.5 * h) * (self._v + self._y)
-            self._account(acting, self.lumped.jumps(mean.reshape(self._shape)))
+            acting.account(self.energies, self.lumped.jumps(mean.reshape(self._shape)))
         if acting.softening is not None:
             live = self._live
             self.energies.bonds += live.follow(acting.softening, self._u, self._v, self._y, h, dt)
@@ -490,19 +327,6 @@ class InterfaceDynamics:
                 self._bonds.active[broken] = False
                 self._bonds.freed[broken] = True
                 self._soften()
-
-    def _account(self, acting: _Acting, way: Array) -> None:
-        """Add the work of the forces on the way of the open jumps, shape (n_open, gdim)."""
-        energies = self.energies
-        for name, found in (
-            ("bonds", acting.fading),
-            ("contact", acting.contact),
-            ("friction", acting.friction),
-        ):
-            if found is not None:
-                rows, forces = found
-                lost = -float(np.vdot(forces, way[rows]))
-                setattr(energies, name, getattr(energies, name) + lost)
 
     def chosen_bonds(self, rows: Ints) -> ChosenBonds:
         """Prepare :meth:`bonds_at` for some tied rows, shape (n,)."""
@@ -535,14 +359,27 @@ class InterfaceDynamics:
             return self._of_live(acting.softening)
         return np.zeros((len(self.lumped.open), self._shape[1]))
 
-    def smallest_gap(self, rows: Bools) -> tuple[float, int]:
-        """Smallest normal gap among some rows, and the row; 0 and -1 where none is open."""
-        chosen = np.flatnonzero(rows[self.lumped.open])
-        if not len(chosen):
-            return 0.0, -1
-        gaps = self._faces.normal_gaps(self.gap)[chosen]
-        i = int(np.argmin(gaps))
-        return float(gaps[i]), int(self.lumped.open[chosen[i]])
+
+def dynamics_of(
+    lumped: LumpedInterface, pairs: Sequence[Pair], fronts: Sequence[Front], continuum: Continuum
+) -> InterfaceDynamics:
+    """The interfaces of a scene at the start: bonded rows are tied, or held by springs; collective.
+
+    Args:
+        lumped: Masses and weights.
+        pairs: Interfaces.
+        fronts: Their fronts, which learn what supports hold.
+        continuum: The bodies.
+    """
+    bonded = np.zeros(lumped.n_rows, dtype=bool)
+    for pair, front, rows, held in zip(pairs, fronts, lumped.row_of, lumped.pair_held, strict=True):
+        front.tied = held.all(axis=1) | (pair.bonded & ~pair.paired)
+        has = rows >= 0
+        bonded[rows[has]] = front.bonded[has]
+    elastic = ElasticBonds(lumped, pairs, continuum)
+    sprung = np.any(elastic.local > 0.0, axis=1)
+    elastic.active = bonded & sprung
+    return InterfaceDynamics(lumped, pairs, bonded & ~sprung, elastic)
 
 
-__all__ = ["ChosenBonds", "InterfaceDynamics", "InterfaceEnergies"]
+__all__ = ["ChosenBonds", "InterfaceDynamics", "dynamics_of"]

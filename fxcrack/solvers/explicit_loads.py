@@ -27,6 +27,7 @@ class LoadsAndMonitors:
         InputError: A load or a monitor does not fit the bodies.
 
     Attributes:
+        n_loads: How many force patterns there are.
         n_thermal: How many patterns belong to the temperature.
     """
 
@@ -36,6 +37,7 @@ class LoadsAndMonitors:
         self._n_local = continuum.n_local
         self._loads = [_load_pattern(continuum, load) for load in loads]
         self._monitors = [LoadPattern(monitor_weights(continuum, m)) for m in monitors]
+        self.n_loads = len(loads)
         self.n_thermal = sum(isinstance(load, ThermalLoad) for load in loads)
         self._held = held_energies(continuum) if self.n_thermal else np.zeros((0, 0))
         self._on_faces: list[Array] = []

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Any
+
 import numpy as np
+import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.interface.front import Front
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 
@@ -15,6 +20,10 @@ class PresentInterface:
     Args:
         lumped: The interfaces.
         dynamics: Their motion.
+
+    Attributes:
+        index: Number of each jump per pair, -1 where there is none or a support holds it, shape
+            (n_nodes, gdim).
     """
 
     def __init__(self, lumped: LumpedInterface, dynamics: InterfaceDynamics) -> None:
@@ -24,6 +33,10 @@ class PresentInterface:
         self._jumps = np.zeros((lumped.n_rows + 1, gdim))
         self._any_held = bool(lumped.held.any())
         self._known = False
+        self.index = []
+        for rows, held in zip(lumped.row_of, lumped.pair_held, strict=True):
+            numbers = gdim * rows[:, None] + np.arange(gdim)
+            self.index.append(np.where((rows >= 0)[:, None] & ~held, numbers, -1))
 
     def forget(self) -> None:
         """Another increment, or other ties."""
@@ -40,6 +53,35 @@ class PresentInterface:
         """Jumps of the rows without a bond, shape (n_rows + 1, gdim), length."""
         self._know()
         return self._jumps
+
+    def in_frames(self) -> tuple[Array, Array]:
+        """Forces on the slave side of open rows, and jumps, in the frames of the rows.
+
+        Returns:
+            Force and length, shape (n_rows gdim,) each; zero where a row is tied.
+        """
+        lumped = self._lumped
+        jumps = np.einsum("nci,nc->ni", lumped.frames, self.jumps[:-1])
+        force = np.zeros_like(jumps)
+        force[lumped.open] = self._dynamics.open_forces()
+        force = np.einsum("nci,nc->ni", lumped.frames, force)
+        return force.ravel(), jumps.ravel()
+
+    def arrays(self, fronts: Sequence[Front], jump: Array) -> dict[str, npt.NDArray[Any]]:
+        """Bonds and jumps of a checkpoint.
+
+        Args:
+            fronts: Per pair.
+            jump: Values of the numbered jumps, shape (n_rows gdim,), length.
+
+        Returns:
+            bonded[p], shape (n_nodes,), and jump[p], shape (n_nodes, gdim), per pair.
+        """
+        out: dict[str, npt.NDArray[Any]] = {}
+        for p, (front, index) in enumerate(zip(fronts, self.index, strict=True)):
+            out[f"bonded[{p}]"] = front.bonded
+            out[f"jump[{p}]"] = np.append(jump, 0.0)[index]
+        return out
 
     def _know(self) -> None:
         if self._known:

@@ -11,7 +11,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.front import Front
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 
 
 class InterfaceValues(Protocol):

@@ -15,9 +15,10 @@ from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import FileOrder
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.solvers.explicit_acting import InterfaceEnergies
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds
 from fxcrack.solvers.explicit_energies import Totals
-from fxcrack.solvers.explicit_interface import InterfaceDynamics, InterfaceEnergies
+from fxcrack.solvers.explicit_interface import InterfaceDynamics
 
 Arrays = dict[str, npt.NDArray[Any]]
 _SAME = 1e-9

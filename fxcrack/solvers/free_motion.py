@@ -9,7 +9,7 @@ import numpy as np
 from fxcrack.condensation.free_bodies import FreeBodies
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.front import Front
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 
 _APART = 1e-9

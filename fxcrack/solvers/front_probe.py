@@ -13,7 +13,7 @@ from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.front import Front
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.solvers.base import Solver
 from fxcrack.solvers.condensed_bodies import CondensedBodies
 

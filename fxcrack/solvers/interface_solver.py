@@ -31,7 +31,7 @@ from fxcrack.equilibrium.friction_state import release_to_contact
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState, allow_contact
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import FIXED, JumpCoordinates, global_vectors
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.base import Solver
 from fxcrack.solvers.front_probe import CondensedFrontProbe

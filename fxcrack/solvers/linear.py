@@ -30,8 +30,9 @@ from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, work_between
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import InterfaceState
+from fxcrack.interface.bond_springs import bond_springs
 from fxcrack.interface.jump_coordinates import build_coordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
 
@@ -82,13 +83,22 @@ class LinearSolver(InterfaceSolver):
                 "CondensedOptions(method='iterative') is not possible with shells, whose stiffness "
                 "against bending and stretching differs too much; leave method out"
             )
-        if options.method == "iterative" or (options.method == "auto" and self._too_large()):
+        yielding = [p.title for p in pairs if p.interface.stiffness is not None]
+        if options.method == "iterative" and yielding:
+            raise InputError(
+                f"CondensedOptions(method='iterative'): interface '{yielding[0]}' has bonds with a "
+                "stiffness of their own, which need a factorisation; leave method or stiffness out"
+            )
+        if options.method == "iterative" or (
+            options.method == "auto" and not yielding and self._too_large()
+        ):
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(
                 continuum, pairs, supports, rtol=options.rtol, cap_mb=options.retained_mb
             )
         self._n_thermal = sum(isinstance(x, ThermalLoad) for x in loads)
         self._held_energies: Array | None = None
+        self._springs: list[Array | None] | None = None
 
     def _too_large(self) -> bool:
         """Whether a factorisation would not fit the memory, which is logged; collective."""
@@ -145,9 +155,12 @@ class LinearSolver(InterfaceSolver):
     def _factored(self, stiffness: PETSc.Mat, roles: Roles) -> DirectCondensation:
         """The bodies condensed by a factorisation; collective."""
         start = time.perf_counter()
+        if self._springs is None:
+            self._springs = bond_springs(self.continuum, self.pairs)
         coordinates = build_coordinates(
-            self.continuum.layout, self.pairs, roles, self.supports, len(self.borders)
-        )
+            self.continuum.layout, self.pairs, roles, self.supports, len(self.borders),
+            self._springs,
+        )  # fmt: skip
         self.timings.add("transform", start)
         start = time.perf_counter()
         found = DirectCondensation(
@@ -175,7 +188,7 @@ class LinearSolver(InterfaceSolver):
         spent = self.continuum.comm.bcast((made.column_seconds, time.perf_counter() - start))
         assert isinstance(self._cost, ColumnCost)
         self._cost.observe(made.computed, *spent)
-        log.info("%d new columns in %.2f s", made.computed, made.column_seconds)
+        log.debug("%d new columns in %.2f s", made.computed, made.column_seconds)
         return made
 
     # -- from equilibrium to equilibrium -------------------------------------------------

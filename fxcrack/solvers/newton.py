@@ -6,37 +6,39 @@ the end (:mod:`fxcrack.solvers.increment_work`).
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import NO_EQUILIBRIUM, ConvergenceError, EnergyImbalance, InputError
 from fxcrack.condensation.iterative import Roles
 from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.weak_form import WeakForm
-from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
+from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
-from fxcrack.interface.jump_coordinates import build_coordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
-from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy
+from fxcrack.solvers.condensed_tangent import CondensedRequest, condense_tangent
+from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy, pulling
 from fxcrack.solvers.free_motion import moves_freely
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
-from fxcrack.solvers.increment_work import (
-    IncrementWork,
-    TrialIncrement,
-    in_pieces,
-)
+from fxcrack.solvers.increment_work import in_pieces
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
-from fxcrack.solvers.newton_state import NewtonState, ResumedTangent, part_of, tangent_arrays
+from fxcrack.solvers.newton_state import (
+    NewtonState,
+    ResumedTangent,
+    Sums,
+    body_arrays,
+    restore_bodies,
+    tangent_arrays,
+)
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
 from fxcrack.solvers.trial import IncrementSolver
+from fxcrack.solvers.trial_account import TrialAccount, overlap_work
 
 _UNSTABLE = (
     "the equilibrium found is unstable (buckling, or a limit load was passed); take smaller "
@@ -109,39 +111,21 @@ class NewtonSolver(InterfaceSolver):
         self.exact = self.free_start = False
         self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
-        self._trial: TrialIncrement | None = None
-        self._last: IncrementWork | None = None  # of the last trial that was confirmed
+        self._account = TrialAccount()
         self._resumed_tangent: ResumedTangent | None = None
 
     # -- condensation --------------------------------------------------------------------
 
     def _condense(self, roles: Roles, loads: Array) -> Condensed:
-        tangent, n_forces = self.tangent, len(self.loads)
-        n_borders = tangent.assemble(self._followed)
-        tangent.release_memory()
-        start = time.perf_counter()
-        coordinates = build_coordinates(
-            self.continuum.layout, self.pairs, roles, self.supports, n_borders
+        return condense_tangent(
+            self.tangent,
+            CondensedRequest(self.pairs, roles, self.supports, loads, self._followed),
+            self.u,
+            restraint=self.restraint,
+            jumps=self.interfaces.jumps,
+            resumed=self._resumed_tangent,
+            at=self.at,
         )
-        self.timings.add("transform", start)
-        self.bodies.set(self.u)
-        if not self.bodies.dynamic:  # inertia holds every body
-            tangent.restraint = self.restraint(roles, coordinates)
-        if self._resumed_tangent is None:
-            tangent.condense(coordinates)
-        else:
-            self._resumed_tangent.condense(tangent, coordinates, self.at)
-        system = ContactSystem(
-            tangent.condensation.schur, coordinates.n_retained, self.n_loads, n_forces,
-            offset=np.zeros(coordinates.n_last),
-        )  # fmt: skip
-        system.cholesky.restraint = tangent.restraint
-        residual = tangent.out_of_balance(loads)
-        jump = self.interfaces.jumps(self.u, coordinates)
-        tangent.anchor(system, residual, jump, loads).destroy()
-        residual.destroy()
-        face_loads = -tangent.condensation.borders_on_retained[:, :n_forces]
-        return Condensed(coordinates, system, face_loads)
 
     def _equilibrium(self, before: InterfaceState, force: Array) -> Equilibrium:
         jump = self.interfaces.jumps(self.u, self.tangent.coordinates)
@@ -166,21 +150,15 @@ class NewtonSolver(InterfaceSolver):
             Whether a pair has changed; the dense system is then another one, and the caller
             goes on to its equilibrium (:meth:`settle`).
         """
-        changed = self.interfaces.pair_anew(self.u, self._pulling())
+        changed = self.interfaces.pair_anew(
+            self.u, pulling(self.index, self.state.force, self.system.soft)
+        )
         if changed:
             self.rebase()
             if self.system.friction is not None:
                 # slips so far, in the jumps of the present pairing
                 self.system.friction.commit(self.state.jump)
         return changed
-
-    def _pulling(self) -> list[Bools]:
-        """Nodes per pair whose bonds are released but still carry a force, shape (n_nodes,)."""
-        carried = np.append(self.state.force != 0.0, False)  # the index is -1 where there is none
-        out = [carried[index].any(axis=1) for index in self.index]
-        for bond in self.system.soft.bonds:
-            out[bond.where[0]][bond.where[1]] = True
-        return out
 
     # -- trials --------------------------------------------------------------------------
 
@@ -262,8 +240,7 @@ class NewtonSolver(InterfaceSolver):
             self._fail()
             raise
         self.interfaces.move_fronts(trial.u)
-        self._give_up()
-        self._trial = trial
+        self._account.take(trial)
         if confirm:
             self.confirm(strict=strict)
         return trial.end
@@ -282,8 +259,7 @@ class NewtonSolver(InterfaceSolver):
             EnergyImbalance: They do not; the accepted state is in force again.
             ConvergenceError: The equilibrium is unstable; likewise.
         """
-        trial = self._trial
-        assert trial is not None
+        trial = self._account.at_hand
         try:
             self._increments.integrate(trial, self.system, exact=self.exact)
         except NotPositiveDefinite as error:
@@ -299,8 +275,8 @@ class NewtonSolver(InterfaceSolver):
 
     def commit(self) -> None:
         """The last trial becomes the accepted state; collective."""
-        trial = self._trial
-        assert trial is not None and trial.work is not None
+        trial = self._account.at_hand
+        assert trial.work is not None
         step = self.u.copy()
         step.aypx(-1.0, trial.u)
         trial.u.copy(self.u)
@@ -309,8 +285,8 @@ class NewtonSolver(InterfaceSolver):
         self.tangent.drift = trial.drift
         self.tangent.accept()
         self.energy.accept(trial.energies)
-        self.state, self._last = trial.end, trial.work
-        self._give_up()
+        self.state = trial.end
+        self._account.accept()
         if self.pairing.pending:
             self.pairing.book(self.nodal_forces(self.u), step, trial.work, len(self.loads))
         step.destroy()
@@ -333,15 +309,9 @@ class NewtonSolver(InterfaceSolver):
         self.counts.failures += 1
         self.revert()
 
-    def _give_up(self) -> None:
-        """Forget the trial."""
-        if self._trial is not None:
-            self._trial.u.destroy()
-            self._trial = None
-
     def _return(self) -> None:
         """Dense system and bodies at the accepted state again."""
-        self._give_up()
+        self._account.give_up()
         self._begin_again()
         tangent = self.tangent
         self.bodies.set(self.u)
@@ -412,7 +382,7 @@ class NewtonSolver(InterfaceSolver):
             return None
         here = self.state
         self._solve(force)
-        self.friction_energy += self._work_of(here, self.state).friction
+        self.friction_energy += self._account.work_of(here, self.state).friction
         return self.along(here, self.state)
 
     # -- back to an accepted state -------------------------------------------------------
@@ -430,7 +400,7 @@ class NewtonSolver(InterfaceSolver):
 
     def recall(self, saved: NewtonState) -> None:
         """Return to an earlier accepted state; collective."""
-        self._give_up()
+        self._account.give_up()
         self.energy.forget()
         here = min(self.continuum.comm.allgather(np.array_equal(self.u.array_r, saved.u)))
         self.u.array[:] = saved.u
@@ -460,14 +430,12 @@ class NewtonSolver(InterfaceSolver):
             :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (5,); and the
             tangent, see :func:`~fxcrack.solvers.newton_state.tangent_arrays`.
         """
-        out = super().collect()
-        out |= {f"bodies.{name}": values for name, values in self.bodies.state().items()}
-        for p, known in enumerate(self.interfaces.pairing()):
-            out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
-        sums = self.pairing.energy, self.largest_force, self.energy.largest, self.tangent.drift
-        out["sums"] = np.array([*sums, self.energy.most])
-        out |= tangent_arrays(self.tangent, self.system, self.face_loads)
-        return out
+        energy = self.energy
+        sums = Sums(
+            self.pairing.energy, self.largest_force, energy.largest, self.tangent.drift, energy.most
+        )
+        out = super().collect() | body_arrays(self.bodies, self.interfaces, sums)
+        return out | tangent_arrays(self.tangent, self.system, self.face_loads)
 
     def resume(self, arrays: Arrays, time: float) -> None:
         """Take the state that :meth:`collect` gave; the next :meth:`prepare` carries it over.
@@ -482,19 +450,15 @@ class NewtonSolver(InterfaceSolver):
         Raises:
             InputError: The mesh has its cells in another order than when the state was saved.
         """
-        self.interfaces.restore_pairing(arrays, "pairing.{}[{}]")
-        if self.continuum.temperature is not None:
-            self.continuum.temperature.set(time)
-        self.bodies.restore(part_of(arrays, "bodies."))
+        sums = restore_bodies(arrays, self.bodies, self.interfaces, time)
         self.u.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
         self.interfaces.move_fronts(self.u)
         self.at = time
-        sums = (float(x) for x in arrays["sums"])
-        self.pairing.energy, self.largest_force, self.energy.largest, drift, *most = sums
-        self.energy.most = most[0] if most else self.energy.largest  # earlier ones did not have it
+        self.pairing.energy, self.largest_force = sums.pairing_energy, sums.largest_force
+        self.energy.largest, self.energy.most = sums.largest_energy, sums.most_energy
         super().resume(arrays, time)
         assert self._resumed is not None
-        self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, drift)
+        self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, sums.drift)
 
     # -- energies and fields -------------------------------------------------------------
 
@@ -508,28 +472,20 @@ class NewtonSolver(InterfaceSolver):
         Returns:
             Two energies, and the mean jumps, shape (n_retained,), length.
         """
-        work = self._work_of(here, point)
+        work = self._account.work_of(here, point)
         return work.external_work(len(self.loads)), work.bonds, work.jump
 
     def book_contact(self, here: Equilibrium, point: Equilibrium) -> None:
         """Add to their energies what friction and faces that overlap did in the last trial."""
-        self.friction_energy += self._work_of(here, point).friction
+        self.friction_energy += self._account.work_of(here, point).friction
         if not self.pairing.pending:
             self.overlap_energy += self._overlap_work(here, point)
 
     def _overlap_work(self, here: Equilibrium, point: Equilibrium) -> float:
         """Work of contact that pushed overlapping faces apart in the last trial."""
         if self.bodies.dynamic:
-            return self._work_of(here, point).overlap
-        closing = self.system.closing(here, point)
-        # nothing pressed on them before, and the pressure grows as they move apart
-        mean = 0.5 * self.system.pressure(point, closing)
-        return float(mean @ (point.jump - here.jump)[closing])
-
-    def _work_of(self, here: Equilibrium, point: Equilibrium) -> IncrementWork:
-        work = self._last if self._trial is None else self._trial.work
-        assert work is not None and work.start is here and work.end is point
-        return work
+            return self._account.work_of(here, point).overlap
+        return overlap_work(self.system, here, point)
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies in the accepted state, by name; collective."""
@@ -559,13 +515,11 @@ class NewtonSolver(InterfaceSolver):
         """
         if state is None or state is self.state:
             return self.u.copy()
-        if self._trial is not None and state is self._trial.end:
-            return self._trial.u.copy()
-        here, n = self.state, self.system.n_retained
-        last = np.zeros(self.tangent.coordinates.n_last)
-        last[:n] = state.jump - here.jump
-        last[n : n + self.n_loads] = state.loads - here.loads
-        out = self.tangent.condensation.displacement(last)
+        trial = self._account.displacement_of(state)
+        if trial is not None:
+            return trial
+        here = self.state
+        out = self.tangent.displacement(state.jump - here.jump, state.loads - here.loads)
         out.axpy(1.0, self.u)
         return out
 
@@ -574,9 +528,7 @@ class NewtonSolver(InterfaceSolver):
 
         By the tangent, loads as they are; the caller destroys it.
         """
-        last = np.zeros(self.tangent.coordinates.n_last)
-        last[: self.system.n_retained] = jump
-        return self.tangent.condensation.displacement(last)
+        return self.tangent.displacement(jump, np.zeros(self.n_loads))
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them."""
@@ -584,7 +536,7 @@ class NewtonSolver(InterfaceSolver):
 
     def destroy(self) -> None:
         """Free all PETSc objects; collective."""
-        self._give_up()
+        self._account.give_up()
         self.pairing.forget()
         self._increments.destroy()
         self.tangent.destroy()

@@ -1,4 +1,4 @@
-"""Accepted states of nonlinear bodies to return to, and the tangent of a checkpoint.
+"""Accepted states of nonlinear bodies to return to, and those of a checkpoint with its tangent.
 
 The dense system need not be that of the accepted displacement: a resumed step goes on with the
 same one, so that it does what it would have done, to round-off.
@@ -7,14 +7,17 @@ same one, so that it does what it would have done, to round-off.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import ContactSystem
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.jump_coordinates import JumpCoordinates
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
+from fxcrack.solvers.deformed_interfaces import DeformedInterfaces
 from fxcrack.solvers.tangent import CondensedTangent
 
 
@@ -37,6 +40,30 @@ class NewtonState:
     terms: list[dict[str, Array]]
     at: float
     pairing_energy: float
+
+
+class Sums(NamedTuple):
+    """Numbers that a computation carries from one accepted state to the next.
+
+    Attributes:
+        pairing_energy: Energy that new pairings have taken so far.
+        largest_force: Largest norm of the internal forces of an accepted state, force.
+        largest_energy: :attr:`StoredEnergy.largest`.
+        drift: That of the tangent, see :class:`CondensedTangent`.
+        most_energy: :attr:`StoredEnergy.most`.
+    """
+
+    pairing_energy: float
+    largest_force: float
+    largest_energy: float
+    drift: float
+    most_energy: float
+
+    @classmethod
+    def of(cls, values: Array) -> Sums:
+        """From an array of shape (5,), or (4,) of checkpoints before the last one was known."""
+        pairing, force, largest, drift, *most = (float(x) for x in values)
+        return cls(pairing, force, largest, drift, most[0] if most else largest)
 
 
 @dataclass(frozen=True)
@@ -101,6 +128,44 @@ class ResumedTangent:
         return all(map(np.array_equal, self.numbers, index))
 
 
+def body_arrays(bodies: WeakForm, interfaces: DeformedInterfaces, sums: Sums) -> Arrays:
+    """The accepted bodies as plain arrays; collective.
+
+    Returns:
+        bodies.* of :meth:`WeakForm.state`, on rank 0; pairing.*[p] where faces slide far; sums,
+        shape (5,).
+    """
+    out: Arrays = {f"bodies.{name}": values for name, values in bodies.state().items()}
+    for p, known in enumerate(interfaces.pairing()):
+        out |= {f"pairing.{name}[{p}]": values for name, values in known.items()}
+    out["sums"] = np.array(sums)
+    return out
+
+
+def restore_bodies(
+    arrays: Arrays, bodies: WeakForm, interfaces: DeformedInterfaces, time: float
+) -> Sums:
+    """Take over what :func:`body_arrays` gave, of any number of ranks; collective.
+
+    Args:
+        arrays: Its arrays, the same on all ranks.
+        bodies: The form terms.
+        interfaces: The interfaces.
+        time: Time of the state.
+
+    Returns:
+        The sums.
+
+    Raises:
+        InputError: The mesh has its cells in another order than when the state was saved.
+    """
+    interfaces.restore_pairing(arrays, "pairing.{}[{}]")
+    if bodies.continuum.temperature is not None:
+        bodies.continuum.temperature.set(time)
+    bodies.restore(part_of(arrays, "bodies."))
+    return Sums.of(arrays["sums"].astype(float))
+
+
 def tangent_arrays(tangent: CondensedTangent, system: ContactSystem, face_loads: Array) -> Arrays:
     """The present tangent as plain arrays; collective.
 
@@ -130,4 +195,12 @@ def part_of(arrays: Arrays, prefix: str) -> dict[str, Array]:
     }
 
 
-__all__ = ["NewtonState", "ResumedTangent", "part_of", "tangent_arrays"]
+__all__ = [
+    "NewtonState",
+    "ResumedTangent",
+    "Sums",
+    "body_arrays",
+    "part_of",
+    "restore_bodies",
+    "tangent_arrays",
+]

@@ -232,6 +232,20 @@ class CondensedTangent:
             self._condensation, self._version, self.drift, self.origin = self._accepted
             self._accepted = None
 
+    def displacement(self, jump: Array, loads: Array) -> PETSc.Vec:
+        """Change of displacement by changes of jumps and loads; collective.
+
+        Args:
+            jump: Change of the retained jumps, shape (n_retained,), length.
+            loads: Change of the loads, shape (n_loads,).
+
+        Returns:
+            Owned dofs; the caller destroys it.
+        """
+        last = np.zeros(self.coordinates.n_last)
+        last[: len(jump) + len(loads)] = np.concatenate([jump, loads])
+        return self.condensation.displacement(last)
+
     # -- forces --------------------------------------------------------------------------
 
     def out_of_balance(self, loads: Array) -> PETSc.Vec:

@@ -7,7 +7,9 @@ import time
 import numpy as np
 from petsc4py import PETSc
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Array
+from fxcrack.base.errors import NO_EQUILIBRIUM
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.friction_state import FrictionWork
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -135,6 +137,9 @@ class IncrementSolver:
             end, values = self._end(system, problem, predicted, loads)
             to = tangent.coordinates.transform.createVecLeft()
             tangent.coordinates.transform.mult(y, to)
+        except NO_EQUILIBRIUM as error:
+            log.debug("trial at t = %.9g: %s; residuals %s", at, error, self._residuals())
+            raise
         finally:
             if motion is not None:
                 motion.end()
@@ -145,6 +150,9 @@ class IncrementSolver:
         to.axpy(1.0, u)
         self.counts.solves += 1
         self.counts.iterations += iterations
+        log.debug(
+            "trial at t = %.9g: %d iterations; residuals %s", at, iterations, self._residuals()
+        )
         drift = problem.drift + (0.0 if problem.renewed else tangent.drift)
         friction, impulses = 0.0, None
         if sliding is not None:
@@ -156,6 +164,10 @@ class IncrementSolver:
         return TrialIncrement(
             points, end, rate, soft, iterations, friction, at, to, values, drift, noise, impulses
         )
+
+    def _residuals(self) -> str:
+        """Norms of the forces out of balance in the last solve, one per iteration."""
+        return ", ".join(f"{norm:.2g}" for norm in self.counts.residuals) or "none"
 
     def _impulses_of(self, system: ContactSystem, problem: snes.InterfaceSnes) -> Array:
         """Give the bodies the contact impulses of an increment of time.

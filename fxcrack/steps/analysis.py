@@ -26,7 +26,7 @@ from fxcrack.continuum.loads import AmplitudeLike, Ramp
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import History
-from fxcrack.interface.pairing import Pair
+from fxcrack.interface.pair import Pair
 from fxcrack.mesh import Mesh
 from fxcrack.solvers.base import AnySolver, Solver
 from fxcrack.solvers.linear import LinearSolver

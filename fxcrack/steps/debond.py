@@ -20,7 +20,8 @@ from fxcrack.base.checks import (
 )
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion, ReleaseLaw, StepRelease, release_laws
-from fxcrack.interface.pairing import Interface, Pair
+from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 
 _BY_DEFAULT = StepRelease()
 """The law of debonds that name none; told from one that was chosen by identity."""

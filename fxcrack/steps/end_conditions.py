@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from fxcrack.base.checks import finite, keep, keep_floats, number, shown, whole
 from fxcrack.base.errors import InputError
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 
 
 @dataclass(frozen=True)

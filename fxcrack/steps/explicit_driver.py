@@ -215,7 +215,9 @@ class ExplicitDriver:
         solver = self.solver
         if not self._may_overlap.any():
             return
-        gap, row = solver.dynamics.smallest_gap(self._may_overlap & ~solver.dynamics.elastic.active)
+        dynamics = solver.dynamics
+        rows = self._may_overlap & ~dynamics.elastic.active
+        gap, row = dynamics.open_pairs.smallest_gap(rows, dynamics.gap)
         if row < 0 or gap >= -_OVERLAP * float(np.abs(solver.jumps).max()):
             return
         p = int(solver.lumped.pair[row])

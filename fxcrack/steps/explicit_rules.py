@@ -13,7 +13,7 @@ from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.criteria import VCCT
 from fxcrack.interface.crack_pressure import CrackPressure
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit_release import law_of
 
@@ -132,6 +132,11 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
             raise InputError(
                 f"interface '{interface.title}': bonds of explicit dynamics hold in all "
                 "directions; leave normal_only out"
+            )
+        if interface.stiffness == "arms":
+            raise InputError(
+                f"interface '{interface.title}': stiffness='arms' is that of shells on surface "
+                "meshes, which Explicit does not have; give 'auto' or three numbers per area"
             )
         if interface.pairing == "surface-to-surface":
             raise InputError(

@@ -15,6 +15,7 @@ import numpy as np
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.history import AT_ONE
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.solvers.base import Solver
 from fxcrack.steps.analysis import Analysis
@@ -31,8 +32,6 @@ _NEVER = (
 )
 _ABOVE = 1.0 + 1e-9
 """Values of f above this are more than 1."""
-_AT_ONE = 1e-6
-"""How far from 1 a search for f = 1 may end, that of nonlinear bodies included."""
 _ONE_LOAD = 1e-6
 """Loads along a path that differ by less than this part are one, to what searches resolve."""
 
@@ -98,7 +97,7 @@ def step_by_events(driver: StepDriver) -> str:
         if reason:
             return reason
         if _reached(driver):
-            driver.record("onset")
+            _record_growth(driver)
             release_critical(analysis)
             driver.record("release")
             continue
@@ -126,7 +125,7 @@ def step_along_path(driver: StepDriver) -> str:
                 return control.why_above()
         elif not _reached(driver) and not _load_to_event(driver):
             return driver.ended() or _never(driver)
-        most = 1.0 + max(_AT_ONE, driver.path.resolution)
+        most = 1.0 + max(AT_ONE, driver.path.resolution)
         if down and (not _reached(driver) or analysis.largest > most):
             fell = analysis.time
         # faces in friction stick when the load turns back, and f with them jumps: where it does so
@@ -135,7 +134,7 @@ def step_along_path(driver: StepDriver) -> str:
         if not turns and (not _reached(driver) or analysis.largest > most):
             continue  # f jumped over 1 where bonds ran through unstable states, or the end came
         fell = math.nan
-        driver.record("onset")
+        _record_growth(driver)
         release_critical(analysis)
         driver.record("release")
 
@@ -157,7 +156,7 @@ def step_by_opening(driver: StepDriver) -> str:
         if not _reached(driver):
             continue  # the end time came first
         control.reach(analysis.solver.state)
-        driver.record("onset")
+        _record_growth(driver)
         release_critical(analysis)
         more = control.excess(analysis.solver.state)
         same = abs(more) <= control.close
@@ -181,6 +180,12 @@ _STEPPINGS: dict[str, Callable[[StepDriver], str]] = {
 def _reached(driver: StepDriver) -> bool:
     """Whether the largest f counts as 1 or more."""
     return driver.analysis.largest >= 1.0 - driver.path.resolution
+
+
+def _record_growth(driver: StepDriver) -> None:
+    """Add the row before a release: an onset at f = 1, or unstable growth at f above 1."""
+    most = 1.0 + max(AT_ONE, driver.path.resolution)
+    driver.record("onset" if driver.analysis.largest <= most else "unstable")
 
 
 # -- loading ---------------------------------------------------------------------------------------

@@ -480,7 +480,7 @@ SCENES: dict[str, Golden] = {
         "enhanced VCCT: onset and propagation toughness, growth that runs away and is arrested",
         lambda comm: beam(
             comm,
-            fx.EnhancedVCCT(GIc=lambda x: np.where(x[:, 0] < 9.5, 0.25, 0.15), GIc_p=0.18),
+            fx.EnhancedVCCT(GIc=lambda x: np.where(x[0] < 9.5, 0.25, 0.15), GIc_p=0.18),
         ),
         until(7),
     ),
@@ -489,7 +489,7 @@ SCENES: dict[str, Golden] = {
         lambda comm: beam(
             comm,
             fx.VCCT(
-                GIc=lambda x: 0.2 + 0.01 * x[:, 0], GIIc=0.6, mix=fx.BK(eta=1.6), method="closure"
+                GIc=lambda x: 0.2 + 0.01 * x[0], GIIc=0.6, mix=fx.BK(eta=1.6), method="closure"
             ),
             mesh={"order": 2, "dx": 2.0},
         ),

@@ -87,7 +87,7 @@ def released_energies(history: fx.History) -> tuple[Array, Array]:
     """G at each onset, and the energy that release set free."""
     rates, energies = [], []
     for before, after in zip(history.rows, history.rows[1:], strict=False):
-        if before["event"] == "onset" and after["event"] == "release":
+        if before["event"] in ("onset", "unstable") and after["event"] == "release":
             rates.append(sum(float(before[f"{m}[bond]"]) for m in ("GI", "GII", "GIII")))
             energies.append(float(after["released_energy"]) - float(before["released_energy"]))
     return np.array(rates), np.array(energies)

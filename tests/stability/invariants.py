@@ -100,6 +100,8 @@ class Invariants:
                 growth = self._scene.debonds[0].criterion
                 self._see("f above 1", largest - 1.0 - growth.tolerance)
         elif event == "onset":
+            self._see("f off 1 at onset", abs(largest - 1.0))
+        elif event == "unstable":
             # after a release f may be anything above 1: the next one follows at once
             self._see("f off 1 at onset", 1.0 - largest)
             # faces in friction stick as the load turns back, where f may jump over 1

@@ -97,7 +97,7 @@ REFUSED: dict[str, tuple[Callable[[], Any], str]] = {
     "first increment": (lambda: fx.Static(until=fx.Time(1.0), initial=NAN), "must satisfy 0 < min"),
     "toughness": (lambda: fx.VCCT(GIc=NAN), "GIc is NaN"),
     "toughness somewhere": (
-        lambda: run(criterion=fx.VCCT(GIc=lambda x: np.where(x[:, 0] > 8.0, NAN, 0.2))),
+        lambda: run(criterion=fx.VCCT(GIc=lambda x: np.where(x[0] > 8.0, NAN, 0.2))),
         "GIc = nan at slave node 9",
     ),
     "support": (

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.history import History
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.output.plots.style import (
     COLOURS,
     GREY,

@@ -17,7 +17,7 @@ from matplotlib.tri import Triangulation
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, unknown_name
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 from fxcrack.output.plots.style import GREY, INK, LIGHT, colour_bar, dress, new_figure, save
 from fxcrack.steps.analysis import Analysis, HasAnalysis, analysis_of
 

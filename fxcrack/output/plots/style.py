@@ -5,6 +5,7 @@ Figures are made without pyplot, so no global state, no window and no backend is
 
 from __future__ import annotations
 
+import io
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,16 @@ LIGHT = "#e6e9ee"
 COLOURS = ("#1b5e9e", "#d8611a", "#2a8f6a", "#7a4fa3", "#b8336a")
 
 
+class NotebookFigure(Figure):
+    """A figure that notebooks show as a picture, although pyplot does not know of it."""
+
+    def _repr_png_(self) -> bytes:
+        """The picture."""
+        stream = io.BytesIO()
+        self.savefig(stream, format="png", dpi=0.6 * DPI)
+        return stream.getvalue()
+
+
 def new_figure(
     width: float = 6.4, height: float = 4.2, ax: Axes | None = None
 ) -> tuple[Figure, Axes]:
@@ -32,7 +43,9 @@ def new_figure(
         while not isinstance(figure, Figure):  # axes of a subfigure
             figure = figure.figure
         return figure, ax
-    figure = Figure(figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white")
+    figure = NotebookFigure(
+        figsize=(width, height), dpi=DPI, layout="constrained", facecolor="white"
+    )
     return figure, figure.add_subplot()
 
 

@@ -1,0 +1,194 @@
+"""What the user says of an interface: two surfaces, the bonded nodes, contact and friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Array
+from fxcrack.base.checks import (
+    flag,
+    is_count,
+    is_function,
+    keep,
+    list_of,
+    number,
+    one_of,
+    positive,
+    shown,
+    text,
+)
+from fxcrack.base.errors import InputError, InterfaceError
+from fxcrack.continuum.face import Face
+from fxcrack.interface.roles import PAIRINGS
+
+Bonded = str | Callable[[Array], Array] | Array | None
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """Two facing surfaces, partly bonded; the crack propagates between them.
+
+    Args:
+        slave: Facet group of the slave side, or the face of a shell (:class:`fxcrack.Face`).
+        master: Facet group or face of the master side; must extend under every bonded slave node.
+            Where the interface ends inside a body both sides share the nodes of that border, which
+            stay bonded.
+        bonded: The initially bonded slave nodes: the name of a group, a function of positions of
+            shape (3, n) that returns n booleans (nodes on the border of its region are bonded,
+            ``>`` and ``>=`` mean the same), an array of booleans per slave node (in the order of
+            ``Pair.surface``), or ``None``: all of them, and no tip exists.
+        contact: Open faces cannot pass through each other (unilateral).
+        friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
+            a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.
+        normal_only: Bonds hold the opening only and let the faces slip.
+        tolerance: Search tolerance, length: how far a slave node may lie from the master surface;
+            a tenth of the master's facet size by default.
+        pairing: How slave nodes follow the master: "node-to-surface", the point under the node, or
+            "surface-to-surface", means over the facets around it. ``None``: node-to-surface where
+            both sides have the same nodes and facets, in which case the two are equal, and
+            surface-to-surface elsewhere; the nodes of the history are then those of the coarser or
+            much softer side, slave or master, unless ``bonded`` names slave nodes. With ``Inertia``
+            and for contact at finite strain node-to-surface is the default, and in ``Explicit`` the
+            only one; so it is where no slave node has a master at the start. Node-to-surface bonds
+            of meshes that do not match hold only if the slave is the finer and softer side.
+        gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
+        stiffness: Of bonds, force/length^3: normal, along the growth direction and along the front.
+            In ``Explicit`` also "auto": that of the cells beside them. Between shells of linear
+            bodies also "arms": what the faces of the arms yield beside the motion of their
+            reference surfaces (:mod:`fxcrack.continuum.face_compliance`), so that the root of a
+            crack turns and slides as that of solids. ``None``: bonds are exact, which costs
+            nothing; in ``Explicit`` a stiffness shortens the increment and lowers G.
+        strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
+            and ignored otherwise.
+        name: What the history calls the interface; the slave's name by default.
+    """
+
+    slave: str | Face
+    master: str | Face
+    bonded: Bonded = None
+    contact: bool = False
+    friction: float | Callable[[Array], npt.ArrayLike] | None = None
+    normal_only: bool = False
+    tolerance: float | None = None
+    pairing: str | None = None
+    gap: str = "adjust"
+    strict: bool = False
+    stiffness: str | tuple[float, float, float] | None = None
+    name: str | None = None
+
+    def __post_init__(self) -> None:
+        """Refuse contradictions that need no mesh."""
+        for name, value in (("slave", self.slave), ("master", self.master)):
+            if not isinstance(value, Face):
+                text("Interface", name, value)
+        text("Interface", "name", self.name, optional=True)
+        if self.slave == self.master:
+            raise InterfaceError(
+                f"interface '{self.slave}' pairs a surface with itself; self-contact is not "
+                "possible here: name two distinct facet groups (a surface inside one conforming "
+                "mesh becomes two by read_mesh(path, split=[Split(...)]))"
+            )
+        where = f"interface '{self.title}'"
+        for name in ("contact", "normal_only", "strict"):
+            keep(self, **{name: flag(where, name, getattr(self, name))})
+        check_bonded(where, self.bonded)
+        if self.tolerance is not None and not (
+            0.0 < number(where, "tolerance", self.tolerance) < np.inf
+        ):
+            raise InterfaceError(
+                f"interface '{self.title}': tolerance = {self.tolerance} must be positive and "
+                "finite; None takes a tenth of the facet size"
+            )
+        if self.pairing is not None:
+            one_of(where, "pairing", self.pairing, PAIRINGS)
+        if not isinstance(self.gap, str) or self.gap not in ("adjust", "keep"):
+            raise InterfaceError(f"gap = {shown(self.gap)}: choose 'adjust' or 'keep'")
+        self._check_friction()
+        self._check_stiffness(where)
+
+    def _check_stiffness(self, where: str) -> None:
+        if isinstance(self.stiffness, str) and self.stiffness in ("auto", "arms"):
+            return
+        if self.stiffness is None:
+            return
+        given = list_of(self.stiffness)
+        if given is None or len(given) != 3:
+            raise InterfaceError(
+                f"{where}: stiffness = {shown(self.stiffness)} must be 'auto', 'arms' or three "
+                "numbers per area, normal, along the growth direction and along the front"
+            )
+        positive(where, **{f"stiffness[{i}]": k for i, k in enumerate(given)})
+        keep(self, stiffness=tuple(float(k) for k in given))
+
+    def _check_friction(self) -> None:
+        if self.friction is None:
+            return
+        where = f"interface '{self.title}'"
+        if not self.contact:
+            raise InterfaceError(
+                f"{where}: friction needs contact; add contact=True or leave friction out"
+            )
+        if self.normal_only:
+            raise InterfaceError(
+                f"{where}: friction is not possible with bonds in the normal direction only; leave "
+                "out friction, or bond in all directions"
+            )
+        if not is_function(self.friction):
+            try:
+                mu = number(where, "friction", self.friction)
+            except InputError as error:
+                raise InterfaceError(
+                    f"{where}: friction = {shown(self.friction)}; give the coefficient, a number "
+                    "such as 0.3, or a function of positions"
+                ) from error
+            check_coefficients(np.array([mu]), where)
+
+    @property
+    def title(self) -> str:
+        """Name in the history."""
+        return self.name or str(self.slave)
+
+
+def check_bonded(where: str, bonded: object) -> None:
+    """Refuse a bonded set that no surface could make sense of.
+
+    Args:
+        where: Beginning of the message.
+        bonded: What the user gave.
+
+    Raises:
+        InterfaceError: It is neither a name, a function, booleans nor None.
+    """
+    if bonded is None or (isinstance(bonded, str) and bonded) or is_function(bonded):
+        return
+    entries = list_of(bonded) or []
+    good = all(isinstance(e, bool | np.bool_) or (is_count(e) and e in (0, 1)) for e in entries)
+    if not entries or not good:
+        raise InterfaceError(
+            f"{where}: bonded must be the name of a group, a function of position, or one boolean "
+            f"for each slave node (no node numbers and no other numbers), but it is a "
+            f"{type(bonded).__name__}"
+            + (f" that begins with {shown(entries[0])}" if entries else "")
+        )
+
+
+def check_coefficients(mu: Array, where: str) -> None:
+    """Refuse coefficients of friction that are negative or no numbers.
+
+    Args:
+        mu: Coefficients, shape (n,).
+        where: Beginning of the message.
+
+    Raises:
+        InterfaceError: One of them is.
+    """
+    bad = ~(np.isfinite(mu) & (mu >= 0.0))
+    if np.any(bad):
+        raise InterfaceError(
+            f"{where}: a coefficient of friction is {mu[bad][0]:g}; it must be a finite number, 0 "
+            "or larger"
+        )
