@@ -1,21 +1,39 @@
 """How far a run is off for its mesh's sake, judged without knowing the answer.
 
-The same scene is run to its first onset with displacements of the other order on the same mesh. For
-a first-order run the difference is its error, but for the error of the second-order one, which goes
-with the element size as well: the estimate is twice the difference. For a second-order run the
-difference is the error of the first-order one, and so a bound that is often far too large.
-Increment stepping adds what f exceeded 1 by. Growth far from the first onset on a coarser mesh is
-not judged.
+A first-order run is compared with a second-order one to the first onset on the same mesh. The
+difference is its error, but for the error of the second-order one, which goes with the element size
+as well: the estimate is twice the difference.
+
+A second-order run is run to its first onset again with the domain integral beside its criterion
+(:mod:`fxcrack.criteria.domain_integral`): G of both at the same state differ by the error of the
+forces and openings at the tip, which goes with the element size. What bodies are too stiff by is
+added. On quadrilaterals and hexahedra it is half of the difference from a first-order run: energies
+converge with the square of 1/order at tips and corners (I. Babuska, B. A. Szabo, I. N. Katz, The
+p-version of the finite element method, SIAM J. Numer. Anal. 18 (1981) 515-545) and faster where
+solutions are smooth, so that the error of second order is a third of that of first order at most.
+First-order triangles and tetrahedra lock in bending and say nothing about second-order ones: on
+them the jumps of the strain between cells of the run itself are taken
+(:mod:`fxcrack.continuum.strain_jumps`), a bound.
+
+Criteria without an energy release rate, shells, cycles and bonds for which there is no domain
+integral are judged by the difference from the other order alone; for a second-order run that is a
+bound, which is often far too large. Increment stepping adds what f exceeded 1 by. Growth far from
+the first onset on a coarser mesh is not judged.
 """
 
 from __future__ import annotations
 
+import time as clock
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from typing import Any, Protocol, Self
+from typing import Any, Protocol, Self, cast
 
+from fxcrack.base import log
 from fxcrack.base.checks import number_or_nan
 from fxcrack.base.errors import FxcrackError, InputError
+from fxcrack.continuum.strain_jumps import part_of_jumps
+from fxcrack.criteria import VCCT, StepRelease
+from fxcrack.criteria.energy_release import Method, RateCriterion
 from fxcrack.history import BEFORE_RELEASE, History, Row
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles
@@ -24,6 +42,8 @@ from fxcrack.steps.element_growth import cyclic_parts
 from fxcrack.steps.end_conditions import Releases
 from fxcrack.steps.static import Static
 
+_STIFFER = 0.5
+"""Error of second order over the difference of the orders: it is a third of that of first order."""
 _MORE = 2.0
 """Estimated error of a first-order run over its difference from the second-order one."""
 _ORDERS = {1: "first", 2: "second"}
@@ -76,6 +96,11 @@ class Estimate:
         difference: Largest difference between the orders.
         interface: Name of the interface.
         simplices: Whether the cells are triangles or tetrahedra.
+        domain: Difference of G from that of the domain integral at the same state; ``None`` where
+            it was not found.
+        jumps: Part of the strain energy that belongs to jumps of the strain between cells; ``None``
+            where the other order tells the stiffness of the bodies.
+        seconds: What the estimate has cost.
     """
 
     load: float
@@ -87,6 +112,9 @@ class Estimate:
     difference: float
     interface: str
     simplices: bool = False
+    domain: float | None = None
+    jumps: float | None = None
+    seconds: float = 0.0
 
     @property
     def total(self) -> float:
@@ -102,9 +130,23 @@ class Estimate:
         text = (
             f"this mesh ({_ORDERS[self.order]} order, elements of {self.size:.3g} at the crack of "
             f"'{self.interface}') gives {', '.join(parts)} off at first growth, "
-            f"{'about' if self.order == 1 else 'or less'}, judged by the {other}-order solution "
-            "on the same mesh"
+            f"{'about' if self.order == 1 else 'or less'}, judged by "
         )
+        if self.domain is None:
+            text += f"the {other}-order solution on the same mesh"
+        else:
+            text += (
+                f"the domain integral, from which G differs by {_percent(self.domain)} at the same "
+                "state, "
+            )
+            text += (
+                f"for the stiffness of the bodies by the {other}-order solution on the same mesh"
+                if self.jumps is None
+                else "for the stiffness of the bodies by the jumps of the strain between cells, to "
+                f"which {_percent(self.jumps)} of the strain energy belong"
+            )
+        if self.seconds > 0.0:
+            text += f" ({self.seconds:.2g} s)"
         if self.stepping > 0.0:
             text += f"; its increments add {_percent(self.stepping)} to the load"
         return text
@@ -126,6 +168,13 @@ class Estimate:
                 size = self.size * accuracy / self.difference
                 mesh_of = "on this mesh" if enough else f"with elements of at most about {size:.2g}"
                 out[-1] = f"order=2 {mesh_of}, or in first order {out[-1]}"
+            elif self.jumps is not None:
+                out[-1] += (
+                    " (keep order=2, in first order they would have to be far smaller; the jumps "
+                    "of the strain are a bound, so halve the elements once and compare)"
+                )
+            elif self.domain is not None:
+                out[-1] += " (keep order=2, in first order they would have to be far smaller)"
             elif self.simplices:
                 out[-1] += (
                     " (keep order=2; the bound is the error of first-order simplices, which are "
@@ -183,12 +232,32 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
         AccuracyError: Nothing can be said; the message says why.
     """
     cycles = isinstance(step, Cycles)
+    start = clock.perf_counter()
     analysis = scene.analysis
     ours, name, excess = _first(analysis.history, grow, cycles=cycles)
     order = analysis.continuum.order
     # of an unknown power the smallest is assumed: it makes the error of the load the largest
     degree = min((d.criterion.degree or 1.0 for d in grow), default=1.0)
     rates = all(d.criterion.knows_toughness for d in grow)
+    domain: float | None = None
+    jumps: float | None = None
+    if order == 2 and not isinstance(step, Cycles):
+        domain, jumps, size = _beside_domain_integral(scene, step, grow, name)
+        if domain is not None and jumps is not None:
+            return Estimate(
+                load=jumps + (1.0 + domain) ** (1.0 / degree) - 1.0,
+                G=2.0 * jumps + domain,  # at given openings it goes with their square
+                stepping=_stepping(analysis.history, name, degree, excess),
+                cycles=None,
+                order=order,
+                size=size,
+                difference=max(jumps, domain),
+                interface=name,
+                simplices=True,
+                domain=domain,
+                jumps=jumps,
+                seconds=_since(analysis, start),
+            )
     try:
         twin = scene.rebuilt(order=3 - order)
         try:
@@ -206,7 +275,8 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
         ) from error
     scale = ((1.0 + other) / (1.0 + excess)) ** (1.0 / degree)  # both at f = 1
     load, rate = _differences(ours, theirs, name, 2 if rates else 1, scale, cycles=cycles)
-    more = _MORE if order == 1 else 1.0
+    more = _MORE if order == 1 else 1.0 if domain is None else _STIFFER
+    at_tip = domain or 0.0
     life = None
     if cycles:
         exponents = [
@@ -215,16 +285,86 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
         ]
         life = (1.0 + more * rate) ** max(exponents, default=0.0) - 1.0
     return Estimate(
-        load=more * load,
-        G=more * rate,
-        stepping=_largest(analysis.history, name) ** (1.0 / degree) - 1.0 if excess else 0.0,
+        load=more * load + (1.0 + at_tip) ** (1.0 / degree) - 1.0,
+        G=more * rate + at_tip,
+        stepping=_stepping(analysis.history, name, degree, excess),
         cycles=life,
         order=order,
         size=size,
         difference=max(load, rate),
         interface=name,
-        simplices=analysis.continuum.mesh.domain.topology.cell_name() in _SIMPLICES,
+        simplices=_has_simplices(analysis),
+        domain=domain,
+        seconds=_since(analysis, start),
     )
+
+
+def _beside_domain_integral(
+    scene: Rerunnable, step: Static, grow: Sequence[Debond], name: str
+) -> tuple[float | None, float | None, float]:
+    """Another run to the first onset with the domain integral beside the criterion; collective.
+
+    Args:
+        scene: The scene, after its run.
+        step: The step it ran.
+        grow: Debonds that were allowed to grow.
+        name: Interface that is to grow first.
+
+    Returns:
+        Relative difference of G at the first onset, ``None`` where there is no energy release rate
+        or no domain integral; the part of the energy that belongs to jumps of the strain, of linear
+        bodies of triangles and tetrahedra; the element size at the front, length.
+    """
+    analysis = scene.analysis
+    if not all(isinstance(d.criterion, RateCriterion) for d in grow):
+        return None, None, 0.0
+    jumps: float | None = None
+    columns = [f"G{mode}{{}}[{name}]" for mode in ("I", "II", "III")]
+    watched: dict[Debond, Debond] = {}
+    try:
+        for d in analysis.debonds:
+            watched[d] = d
+            if d in grow and d.interface.title == name:
+                # at the first onset nothing is released yet
+                decides = cast(RateCriterion, d.criterion).method
+                other: Method = "vcct" if decides == "domain" else "domain"
+                another = VCCT(GIc=1.0, method=other)
+                watched[d] = replace(d, release=StepRelease(), watch=[another])
+        twin = scene.rebuilt(debonds=list(watched.values()))
+        try:
+            short = _to_onset(step, linear=analysis.linear)
+            again = [watched[d] for d in grow]
+            twin.run(short, grow=again, progress=False)
+            row, _, _ = _first(twin.analysis.history, again, cycles=False)
+            size = _size(twin.analysis, name)
+            if _has_simplices(analysis) and analysis.linear:
+                u = twin.analysis.condensed.displacement()
+                jumps = part_of_jumps(twin.analysis.continuum, u.array_r.copy())
+                u.destroy()
+        finally:
+            twin.close()
+    except FxcrackError as error:
+        log.info("accuracy: no domain integral to compare with (%s)", error)
+        return None, None, 0.0
+    suffix = "_vcct" if f"GI_vcct[{name}]" in row else "_domain"
+    own, beside = (sum(float(row.get(c.format(of), 0.0)) for c in columns) for of in ("", suffix))
+    if not (own > 0.0 and beside > 0.0):
+        return None, None, 0.0
+    return abs(own / beside - 1.0), jumps, size
+
+
+def _has_simplices(analysis: Analysis) -> bool:
+    return analysis.continuum.mesh.domain.topology.cell_name() in _SIMPLICES
+
+
+def _stepping(history: History, name: str, degree: float, excess: float) -> float:
+    """Error of the load by increments that end at f above 1."""
+    return _largest(history, name) ** (1.0 / degree) - 1.0 if excess else 0.0
+
+
+def _since(analysis: Analysis, start: float) -> float:
+    """Seconds since a time of the clock, those of rank 0."""
+    return float(analysis.comm.bcast(clock.perf_counter() - start))
 
 
 def _to_onset(step: Static | Cycles, *, linear: bool) -> Static | Cycles:

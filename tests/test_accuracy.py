@@ -224,26 +224,32 @@ def test_what_cannot_be_judged_is_said() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "size", "order", "load", "rate"),
+    ("name", "size", "order", "load", "rate", "cell"),
     [
         # true errors in per cent: of the load, and of G at a given load (of the dcb: at a given
         # opening), counted from the limits of the finest runs of fxcrack accuracy NAME
-        ("dcb", 0.5, 1, 0.742, 3.04),
-        ("enf", 0.5, 1, 1.36, 2.95),
-        ("mmb", 0.5, 1, 0.868, 2.25),
-        ("fatigue_dcb", 0.25, 1, 2.61, 4.04),
-        ("dcb", 0.5, 2, 0.101, 0.692),
-        ("enf", 0.5, 2, 0.381, 0.845),
+        ("dcb", 0.5, 1, 0.742, 3.04, "quadrilateral"),
+        ("enf", 0.5, 1, 1.36, 2.95, "quadrilateral"),
+        ("mmb", 0.5, 1, 0.868, 2.25, "quadrilateral"),
+        ("fatigue_dcb", 0.25, 1, 2.61, 4.04, "quadrilateral"),
+        ("dcb", 0.5, 2, 0.101, 0.692, "quadrilateral"),
+        ("enf", 0.5, 2, 0.381, 0.845, "quadrilateral"),
+        # loads and openings at first growth over those of the quadrilaterals and their errors
+        ("dcb", 0.5, 2, 0.163, 0.98, "triangle"),
+        ("enf", 0.5, 2, 0.56, 1.21, "triangle"),
     ],
 )
 def test_the_estimate_is_above_the_true_error_and_not_far(
-    name: str, size: float, order: int, load: float, rate: float
+    name: str, size: float, order: int, load: float, rate: float, cell: str
 ) -> None:
-    case = _case(name, size=size, order=order, stepping=STUDIES[name].steppings[0])
+    case = _case(name, size=size, order=order, cell=cell, stepping=STUDIES[name].steppings[0])
     case.scene.run(case.step, progress=False)
     found = estimate_errors(case.scene, case.step, case.scene.debonds)
-    # twice the difference for the first order; for the second a bound of the first one's error
-    far = 2.5 if order == 1 else 8.0
+    # twice the difference for the first order; for the second a bound from half of it, and on
+    # triangles from jumps of the strain, in which soft directions count like stiff ones
+    far = {1: 2.5, 2: 8.0 if cell == "quadrilateral" else 20.0}[order]
+    assert (found.domain is not None) == (order == 2)
+    assert (found.jumps is not None) == (cell == "triangle")
     assert load < 100.0 * found.load < far * load
     assert rate < 100.0 * found.G < far * rate
     case.scene.close()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -78,14 +79,18 @@ def test_a_clamped_end(caplog: pytest.LogCaptureFixture) -> None:
         (1, 0.04, False, "order=2 with elements of at most about 0.25, or in first order"),
         (2, 0.04, False, "elements of at most about 0.25 at the crack.* [(]keep order=2[)]"),
         (2, 0.04, True, "0.25 at the crack.* first-order simplices, which are far too stiff"),
+        (2, 0.04, None, "0.25 at the crack.* in first order they would have to be far smaller"),
     ],
 )
 def test_accuracy_recommends_order_and_size(
-    order: int, difference: float, simplices: bool, words: str
+    order: int, difference: float, simplices: bool | None, words: str
 ) -> None:
     """1 % is asked for at size 1: errors fall with the size, in second order to half as much."""
     error = difference * (2.0 if order == 1 else 1.0)
-    estimate = Estimate(error, error, 0.0, None, order, 1.0, difference, "bond", simplices)
+    estimate = Estimate(error, error, 0.0, None, order, 1.0, difference, "bond", bool(simplices))
+    if simplices is None:
+        estimate = replace(estimate, domain=0.02)
+        assert "from which G differs by 2 % at the same state" in str(estimate)
     assert re.search(words, estimate.remedy(0.01))
 
 

@@ -19,6 +19,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -75,15 +76,22 @@ def _imported(path: Path) -> Iterator[Path]:
 
 
 def code_of(text: str) -> str:
-    """The code of a module without comments, docstrings and layout."""
-    tree = ast.parse(text)
-    for node in ast.walk(tree):
-        body = getattr(node, "body", None)
-        kinds = ast.Module | ast.FunctionDef | ast.ClassDef
-        if isinstance(node, kinds) and body and isinstance(body[0], ast.Expr):
-            if isinstance(body[0].value, ast.Constant) and isinstance(body[0].value.value, str):
-                body[0].value.value = ""
-    return ast.unparse(tree)
+    """The code of a module without comments, docstrings and layout, whatever Python reads it."""
+    lines = text.splitlines(keepends=True)
+    left_out: list[tuple[tuple[int, int], tuple[int, int]]] = []
+    for token in tokenize.generate_tokens(iter(lines).__next__):
+        if token.type == tokenize.COMMENT:
+            left_out.append((token.start, token.end))
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.FunctionDef | ast.ClassDef) and node.body:
+            first = node.body[0]
+            if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
+                end = first.end_lineno or first.lineno, first.end_col_offset or 0
+                left_out.append(((first.lineno, first.col_offset), end))
+    for (row, column), (last, end) in sorted(left_out, reverse=True):
+        rest = lines[last - 1][end:]
+        lines[row - 1 : last] = [lines[row - 1][:column] + rest, *[""] * (last - row)]
+    return "".join("".join(lines).split())
 
 
 def digest(figure: str) -> str:

@@ -26,10 +26,13 @@ _COLOUR = {
 }
 """Colour of the first order of each shape, the next one that of the second."""
 _PALETTE = (*COLOURS, "#8c6d1f")
-_MARKERS = {"vcct": "o", "closure": "s", "increment": "^", "solver": "D", "ranks": "h"}
+_MARKERS = {
+    **{"vcct": "o", "closure": "s", "domain": "v", "increment": "^", "solver": "D", "ranks": "h"},
+}
 _WORDS = {
     "vcct": "VCCT, events",
     "closure": "exact closure",
+    "domain": "domain integral",
     "increment": "increments",
     "solver": "other solver",
     "ranks": "2 ranks",

@@ -107,6 +107,7 @@ class TipFields:
         axes: Rows growth direction, normal, their vector product, shape (3, 3).
         oscillation: Oscillation index eps.
         energy: M of G = k . M k, shape (3, 3) [length^2/force].
+        span: What makes real and imaginary part of K, and K_3, of k, shape (3, 3).
     """
 
     def __init__(self, above: Array, below: Array, frame: Array, length: float) -> None:
@@ -127,7 +128,7 @@ class TipFields:
         eps = float(np.log(values[2] / values[0]) / (4.0 * np.pi))
         self.oscillation = 0.0
         if eps < _NO_OSCILLATION:
-            self._span = np.eye(3)
+            self.span = np.eye(3)
             self._across = np.eye(3)
             self.energy = 0.25 * h.real
             return
@@ -138,11 +139,11 @@ class TipFields:
         third = (third / third[np.argmax(np.abs(third))]).real
         self.oscillation = eps
         self._spin = w
-        self._span = np.linalg.inv(np.stack([2.0 * w.real, -2.0 * w.imag, third], axis=1))
+        self.span = np.linalg.inv(np.stack([2.0 * w.real, -2.0 * w.imag, third], axis=1))
         twice = 2.0 * h.real
         pair = float((w.conj() @ twice @ w).real) / (4.0 * np.cosh(np.pi * eps) ** 2)
         alone = float(third @ twice @ third) / 8.0
-        self.energy = self._span.T @ np.diag([pair, pair, alone]) @ self._span
+        self.energy = self.span.T @ np.diag([pair, pair, alone]) @ self.span
         self._third = third
 
     def gradients(self, x: Array, side: int) -> Array:
@@ -210,7 +211,7 @@ class TipFields:
         unit = np.eye(3)[mode]
         if self._spin is None:
             return [(root * (inverse @ unit), -0.5)]
-        a, b, c = self._span @ unit
+        a, b, c = self.span @ unit
         eps, k = self.oscillation, a + 1j * b
         turn = np.exp(1j * eps * (log_z - np.log(self.length)))
         scale = root / np.cosh(np.pi * eps)

@@ -42,6 +42,8 @@ class VCCT(RateCriterion):
         rings: Outer radius of that ring, in lengths of the cells at the tip.
         reference_length: Length to which the modes of method="domain" belong between two
             materials [length].
+        mode_length: Length of closure to which the modes of the other methods belong between two
+            materials [length] (:mod:`~fxcrack.criteria.mode_length`).
         normalisation: Length VCCT divides by, see :func:`energy_release_rates`.
         unstable_tolerance: f_tol of unstable growth: several nodes may debond at one load
             while 1 + tolerance <= f <= 1 + unstable_tolerance. None: off; math.inf: unlimited.

@@ -165,6 +165,11 @@ def _rates(title: str, criterion: RateCriterion, nodal: bool) -> tuple[str, list
             f"'{criterion.normalisation}' have no word in a deck; the defaults are what it is read "
             "with"
         )
+    if criterion.mode_length is not None:
+        raise InputError(
+            f"write_deck: interface '{title}': mode_length={criterion.mode_length:g} has no word "
+            "in a deck, whose modes are those of the element length; leave it out"
+        )
     law, exponents = _law(title, criterion)
     head = f"MIXED MODE BEHAVIOR={law}"
     if nodal:

@@ -33,8 +33,8 @@ from fxcrack.criteria import (
     total,
 )
 from fxcrack.criteria.cycle_rates import joined
-from fxcrack.criteria.energy_release import RateEvaluator
 from fxcrack.criteria.evaluator import repeat_tips
+from fxcrack.criteria.rate_evaluator import RateEvaluator
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import Row
 from fxcrack.interface.tips import Tips

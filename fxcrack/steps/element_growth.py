@@ -10,8 +10,8 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.criteria import CycleJump, CycleRates, Fatigue, FatigueLaw, Regime, element_cycles
-from fxcrack.criteria.energy_release import RateEvaluator
 from fxcrack.criteria.evaluator import TipValues
+from fxcrack.criteria.rate_evaluator import RateEvaluator
 from fxcrack.interface.tips import Tips
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import TipCycle

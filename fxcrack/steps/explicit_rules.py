@@ -122,6 +122,11 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 f"{where}: method='{criterion.method}' needs the condensed stiffness of the "
                 "bodies, which explicit dynamics does not have; use method='vcct'"
             )
+        if criterion.mode_length is not None:
+            raise InputError(
+                f"{where}: mode_length is not available in explicit dynamics, whose crack-tip "
+                "fields depend on the speed of the crack as well; leave it out"
+            )
         if criterion.viscosity > 0.0 and law_of(debond).driver != "once":
             raise InputError(
                 f"{where}: in explicit dynamics viscosity delays a release at once; add "

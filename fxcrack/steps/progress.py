@@ -90,7 +90,7 @@ class Progress:
         if self._rows is None:
             self._rows = self._now()
         self._share.update(row)
-        self._text = f"step {self._number}: {describe(event, row, self._share)}"
+        self._text = describe(event, row, self._share)
         if self._live is not None:
             self._live.update(_Line(self))
         elif self._now() >= self._due:
@@ -101,13 +101,16 @@ class Progress:
 
     @property
     def line(self) -> str:
-        """The last row, the time elapsed, and the time left where it can be known."""
+        """The time elapsed, the time left where it can be known, and the last row.
+
+        What is cut off on narrow terminals comes last.
+        """
         now = self._now()
-        words = f"{self._text}   {clock(now - self._begin)} elapsed"
+        words = f"step {self._number} after {clock(now - self._begin)}"
         part = self._share.part
-        if self._rows is None or part is None or not _KNOWN <= part < 1.0:
-            return words
-        return f"{words}, about {clock((now - self._rows) * (1.0 - part) / part)} left"
+        if self._rows is not None and part is not None and _KNOWN <= part < 1.0:
+            words += f", about {clock((now - self._rows) * (1.0 - part) / part)} left"
+        return f"{words}: {self._text}"
 
 
 class _Line:
@@ -135,7 +138,7 @@ def clock(seconds: float) -> str:
 
 
 def describe(event: str, row: Row, share: ShareDone | None = None) -> str:
-    """Words for a row: time, the first reaction or load, crack lengths, criteria.
+    """Words for a row: crack lengths, criteria, time, the first reaction or load.
 
     Args:
         event: Name of the event.
@@ -148,11 +151,11 @@ def describe(event: str, row: Row, share: ShareDone | None = None) -> str:
         text = f"{shown} = {row[name]:.{digits}g}"
         return f"{text} of {goals[name]:.{digits}g}" if name in goals else text
 
-    parts = [f"{event:<9} {entry('N', 'N') if 'N' in row else entry('time', 't')}"]
+    parts = [event]
+    parts += [entry(k, k) for k in row if k.startswith("a[")]
+    parts += [entry(k, k, 4) for k in row if k.startswith("f[")]
+    parts.append(entry("N", "N") if "N" in row else entry("time", "t"))
     load = next((k for k in row if k.startswith("R[") and f"u{k[1:]}" in row), None)
     load = load or next((k for k in row if k.startswith("F[")), None)
-    names = [load] if load else []
-    names += [k for k in row if k.startswith("a[")]
-    parts += [entry(k, k) for k in names]
-    parts += [entry(k, k, 4) for k in row if k.startswith("f[")]
-    return "   ".join(parts)
+    parts += [entry(load, load)] if load else []
+    return "  ".join(parts)
