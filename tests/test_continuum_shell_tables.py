@@ -13,6 +13,7 @@ import pytest
 from delaminations import PLY
 from mpi4py import MPI
 from scipy.integrate import quad
+from test_continuum_shell import sphere
 from thin_bodies import thin_body
 
 import fxcrack as fx
@@ -259,4 +260,33 @@ def test_stable_increments_of_first_order(thickness: float, wanted: float) -> No
     scene.run(fx.Explicit(until=fx.Time(3.0 * wanted)), progress=False)
     # two digits are known; what is used is a bound from the motion of the cells
     assert scene.solver.stable == pytest.approx(wanted, rel=5e-2)
+    scene.close()
+
+
+@pytest.mark.slow
+def test_hemisphere_of_large_rotation() -> None:
+    """Pinched by 400 (4.067 out, 8.178 in), 8 x 8 cells of second order."""
+    mesh = thin_body((8, 8), (np.pi / 2, np.radians(72.0)), 0.04, sphere(10.0))
+    scene = fx.Scene(
+        mesh,
+        model=fx.Solid(),
+        materials=fx.ContinuumShell(fx.Isotropic(6.825e7, 0.3), "inner", "outer"),
+        supports=[
+            fx.Displacement("a1", x=0.0),
+            fx.Displacement("a0", y=0.0),
+            fx.Displacement("corner", z=0.0),
+        ],
+        loads=[
+            fx.PointForce("line0", (200.0, 0.0, 0.0)),
+            fx.PointForce("line1", (0.0, -200.0, 0.0)),
+        ],
+        monitors=[
+            fx.Monitor("line0", (1, 0, 0), name="out"),
+            fx.Monitor("line1", (0, -1, 0), name="into"),
+        ],
+        effects=[fx.FiniteStrain()],
+    )
+    history = scene.run(fx.Static(until=fx.Time(1.0), initial=0.1), progress=False)
+    assert history["m[out]"][-1] == pytest.approx(3.995, rel=5e-3)
+    assert history["m[into]"][-1] == pytest.approx(7.935, rel=5e-3)
     scene.close()

@@ -172,6 +172,8 @@ def test_mode_one(
     assert found == pytest.approx(wanted, abs=3e-3)
 
 
+@pytest.mark.mpi
+@pytest.mark.three
 def test_mode_two(comm: MPI.Intracomm) -> None:
     """ENF: G of solids within 1 %, where exact bonds lack 8 %."""
     scene = enf(comm, 2.0, stiffness="arms")

@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.base import compat
+from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.mesh import Group
 from fxcrack.meshes.sheets import Sheet, sheets
 
@@ -158,6 +159,42 @@ def test_a_face_of_several_sections(comm: MPI.Intracomm) -> None:
         plain.rebuilt(materials={"near": near, "far": fx.Section(UD, thickness=2.0), "lower": low})
 
 
+@pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("offset", [0.75, -0.3])
+def test_meshes_off_the_middle(comm: MPI.Intracomm, order: int, offset: float) -> None:
+    """Load and rate do not depend on where the mesh of an arm lies, from face to face.
+
+    The pins hold the reference surface, which the thickness strain moves beside the middle: half a
+    per cent is left for that.
+    """
+    laminate = fx.Laminate("[45/-45/-45/45]", UD, 0.375)
+    x, y = np.linspace(0.0, 64.0, 65), np.linspace(0.0, 4.0, 3)
+    found = []
+    for s in (0.0, offset):
+        parts = [
+            Sheet(name, x, y, lambda a, b, z=z: (a, b, z + 0.0 * a))
+            for name, z in (("upper", 0.75 - s), ("lower", -0.75 - s))
+        ]
+        scene = fx.Scene(
+            sheets(parts, comm, order=order, name="arms"),
+            model=fx.Shell(),
+            materials=fx.Section(laminate, offset=s),
+            supports=[
+                fx.Clamp("upper_a1"),
+                fx.Clamp("lower_a1"),
+                fx.Displacement("upper_a0", z=0.5),
+                fx.Displacement("lower_a0", z=-0.5),
+            ],
+            debonds=[fx.Debond(bond(16.0), fx.VCCT(GIc=1e3))],
+        )
+        scene.run(FAST, progress=False)
+        rates = mean_rates(scene)
+        assert abs(rates[1:]).max() < 1e-9 * rates[0]
+        found.append((float(scene.history["R[upper_a0.z]"][-1]), rates[0]))
+        scene.close()
+    assert found[1] == pytest.approx(found[0], rel=8e-3)
+
+
 def test_triangles_as_quadrilaterals(comm: MPI.Intracomm) -> None:
     quads, triangles = (
         over_beam_theory(dcb(comm, (cell, 1), 2.5, ny=10)) for cell in ("quadrilateral", "triangle")
@@ -183,6 +220,25 @@ def test_dcb_grows(comm: MPI.Intracomm) -> None:
     assert a[-1] >= 40.0 - 1e-9
     assert np.all(np.diff(opening) >= -1e-12)
     assert np.abs(history["balance"]).max() < 1e-8
+
+
+def test_growth_of_second_order(comm: MPI.Intracomm) -> None:
+    """Onsets from 30 to 37.5 in plane strain: load and opening of corrected beam theory."""
+    scene = dcb(comm, ("quadrilateral", 2), 2.5)
+    planes = [
+        fx.Symmetry(f"{arm}_{edge}", "y") for arm in ("upper", "lower") for edge in ("b0", "b1")
+    ]
+    scene = scene.rebuilt(supports=[*scene.input.supports, *planes])
+    until = [fx.CrackLength(scene.debonds[0].interface, 40.0), fx.Time(20.0)]
+    onsets = [r for r in scene.run(fx.Static(until=until), progress=False) if r["event"] == "onset"]
+    theory = CorrectedBeam(E=E1 / (1.0 - 0.3**2 * E3 / E1), E22=E3, G=G13, h=HEIGHT, b=WIDTH)
+    assert [r["a[bond]"] for r in onsets][:4] == pytest.approx([30.0, 32.5, 35.0, 37.5])
+    for row in onsets[:4]:
+        a = row["a[bond]"]
+        load = np.sqrt(0.17 * WIDTH * theory.E * theory.inertia) / (a + theory.chi * HEIGHT)
+        assert row["R[upper_a0.z]"] == pytest.approx(load, rel=3e-3)
+        assert row["time"] == pytest.approx(theory.dcb_opening(a, load), rel=5e-3)
+    scene.close()
 
 
 # -- mixed modes -----------------------------------------------------------------------------------

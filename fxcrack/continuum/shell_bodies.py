@@ -10,7 +10,7 @@ stiffness of :mod:`fxcrack.continuum.section`. Cells are integrated and condense
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
@@ -188,20 +188,27 @@ class ShellBodies(Continuum):
         k = np.minimum(section.height**2 / size, 1.0)[:, None]
         soft = ((1.0 - k) * element.soft[0] + k * element.soft[1]) * weight
         bending = weight * element.bending
-        stiffness = section.stiffness()
+        stiffness = replace(section, offset=0.0).stiffness()
         moduli = soft[..., None, None] * stiffness
         moduli[..., 6:, 6:] = bending[..., None, None] * stiffness[6:, 6:]
+        if section.offset:  # strains of the middle: e0 + offset e1
+            to_middle = np.eye(12) + section.offset * np.eye(12, k=6)
+            moduli = to_middle.T @ moduli @ to_middle
         local = np.zeros((*weight.shape, 12, 9))
         local[..., :6, :6] = to_axes
         local[..., 6:, 6:] = to_axes[..., [0, 1, 5]]
         thickness = np.zeros((*weight.shape, 12, 1))
-        thickness[..., 6:, 0] = to_axes[..., 2]  # E1_33
+        thickness[..., 6:, 0] = to_axes[..., 2]  # E1_33, 0 at the middle
+        thickness[..., :6, 0] = -section.offset * to_axes[..., 2]
         enhanced = [thickness]
         if self.shell.enhanced_membrane and nodes.shape[1] == 4:
             enhanced.append(self._membrane_modes(x, sign, section, jacobian))
         return ShellPart(
             section, np.asarray(cells, dtype=np.int64), nodes, axes, weight * rule, soft,
-            StrainCells(vectors, element.matrices, local, np.concatenate(enhanced, -1), moduli),
+            StrainCells(
+                vectors, element.matrices_at(section.offset), local, np.concatenate(enhanced, -1),
+                moduli,
+            ),
         )  # fmt: skip
 
     def _membrane_modes(self, x: Array, sign: Array, section: Section, jacobian: Array) -> Array:

@@ -9,7 +9,9 @@ x_1, d_1, x_2, d_2, ..., the covariant strains are quadratic in them
     E0_a3 = (x,a . d - ...)/2        E0_33 = (d . d - ...)/2
 
 where "..." is the same of the undeformed shell. E1_a3 is left out (of order thickness/radius), and
-E1_33 is an enhanced strain (seven parameters: Buechter, Ramm, Roehl 1994).
+E1_33 is an enhanced strain (seven parameters: Buechter, Ramm, Roehl 1994). Where the middle of the
+section lies at z = s off the reference surface, E_a3 is that of the middle, with x + s d in the
+place of x, and the enhanced strain is 0 there: so the shell is the same wherever its mesh lies.
 
 First order: E0_a3 is tied at the middles of the edges (quadrilaterals: Dvorkin and Bathe 1984;
 triangles: Lee and Bathe 2004) and E0_33 at the corners (Betsch and Stein 1995). Second-order
@@ -60,6 +62,20 @@ class ShellElement:
     centre_gradients: Array
     node_gradients: Array
     corners: Array
+
+    def matrices_at(self, offset: float) -> Array:
+        """Matrices of a section whose middle lies off the reference surface, shape as theirs.
+
+        Args:
+            offset: Coordinate z of the middle, length.
+        """
+        if not offset:
+            return self.matrices
+        n = self.matrices.shape[-1] // 2
+        to_middle = np.kron(np.eye(n), np.array([[1.0, offset], [0.0, 1.0]]))
+        out = self.matrices.copy()
+        out[:, 3:5] = to_middle.T @ out[:, 3:5] @ to_middle
+        return out
 
 
 @lru_cache(maxsize=8)

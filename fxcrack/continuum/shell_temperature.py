@@ -161,7 +161,9 @@ def _stress(part: ShellPart, temperature: Array) -> Array:
     resultants = temperature @ part.section.thermal_forces()
     out = np.empty_like(resultants)
     out[..., :6] = resultants[..., :6] * part.soft[..., None]
-    out[..., 6:] = resultants[..., 6:] * part.area[..., None]
+    # couples about the middle, with the rule of bending; forces act there
+    arm = part.section.offset * resultants[..., :6]
+    out[..., 6:] = (resultants[..., 6:] - arm) * part.area[..., None] + arm * part.soft[..., None]
     return out
 
 
