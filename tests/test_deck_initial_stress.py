@@ -93,13 +93,21 @@ def test_orthotropic_bodies_and_parts(tmp_path):
     assert not any("in proportion to time" in line for line in found.report.replaced)
 
 
+def test_expansions_without_temperatures_do_nothing(tmp_path):
+    text = PLATE + "*EXPANSION\n1E-3\n*INITIAL CONDITIONS, TYPE=STRESS\n1, 5.\n"
+    plain, stressed = sorted(
+        read(tmp_path, text + STEP).arguments["materials"].values(), key=lambda m: str(type(m))
+    )
+    assert plain.expansion == 0.0 and stressed.expansion[0] == pytest.approx(-5.0 / 200.0)
+
+
 @pytest.mark.parametrize(
     "text, words",
     [
         (PLATE + stress("1., 2., 3., 4., 5.") + STEP, "there are 5 components"),
         (PLATE.replace("CPE4", "CPS4") + stress("0., 0., 1.") + STEP, "normal to the plane"),
         (PLATE + "*PLASTIC\n1.\n" + stress("1.") + STEP, "linear elastic"),
-        (PLATE + "*EXPANSION\n1E-5\n" + stress("1.") + STEP, "beside \\*EXPANSION"),
+        (PLATE + "300., 0.25, 9.\n" + stress("1.") + STEP, "tables against temperature"),
         (
             PLATE + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 1.\n" + stress("1.") + STEP,
             "beside temperatures",

@@ -13,7 +13,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.materials import Isotropic, Material, Orthotropic
-from fxcrack.continuum.temperature import Temperature
+from fxcrack.continuum.temperature import ByTemperature, Temperature
 from fxcrack.deck.cards import Card
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.procedures import Procedure
@@ -72,15 +72,16 @@ class InitialStress:
         Raises:
             DeckError: It is of another kind, or the stress is not along its axes.
         """
-        if self.card is None or not any(stress):
+        if self.card is None or not self._values.any():
             return material
+        if isinstance(material, ByTemperature):
+            self.card.fail("initial stresses beside tables against temperature are not available")
+        if not any(stress):
+            # the deck has no temperatures, in which an expansion could act
+            return replace(material, expansion=0.0)  # type: ignore[type-var]
         if type(material) not in (Isotropic, Orthotropic):  # bodies that yield are no such
-            self.card.fail(
-                "initial stresses need a linear elastic material without tables against temperature"
-            )
+            self.card.fail("initial stresses need linear elastic materials")
         assert isinstance(material, Isotropic | Orthotropic)
-        if np.any(material.expansion):
-            self.card.fail("initial stresses beside *EXPANSION are not available; leave one out")
         s = np.array(stress)
         if isinstance(material, Orthotropic):
             if np.abs(s[3:]).max() > _TINY * np.abs(s).max():
