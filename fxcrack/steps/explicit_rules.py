@@ -51,6 +51,11 @@ def check_bodies(continuum: Continuum, loads: Sequence[Any]) -> None:
             "Explicit: shells on surface meshes have no lumped masses for explicit dynamics; use a "
             "Dynamic step, or ContinuumShell on hexahedra of first order"
         )
+    if continuum.layout.shared:
+        raise InputError(
+            "Explicit: the strain out of the plane in GeneralisedPlaneStrain has no mass that "
+            "could move it; use a Dynamic step, or PlaneStrain"
+        )
     if continuum.order != 1:
         raise InputError(
             "Explicit needs first-order elements: row sums of second-order ones give corner nodes "
