@@ -28,6 +28,7 @@ from fxcrack.demos import (
     penny,
     pinch,
     shell_dcb,
+    skin_stringer,
     skin_stringer_panel,
     thermal_bilayer,
     two_cracks,
@@ -116,6 +117,32 @@ def test_shell_dcb_is_close_to_the_solids_with_long_cells():
     load, rate, strip = shell_dcb.beside(found, reference)
     assert abs(load) < 0.02 and abs(rate) < 0.02 and strip < 0.02  # the required 2 %
     assert found["unknowns"] < 0.25 * reference["unknowns"]
+
+
+@pytest.mark.slow
+def test_skin_stringer_counts_only_what_lies_under_the_foot():
+    """Whole skin as slave, or the foot: one crack, whose G is the change of strain energy."""
+    found = [
+        skin_stringer.check(2.0, 10.0, 4.0, slave, order=1)
+        for slave in ("skin_outside", "foot_bottom")
+    ]
+    for one in found:
+        assert one["area"] == pytest.approx(160.0) and one["tips"] == 5.0
+        # VCCT on elements half as long as the debond; the difference spans four of them
+        assert one["VCCT"] == pytest.approx(one["-dU/dA"], rel=0.05)
+    assert found[0]["VCCT"] == pytest.approx(found[1]["VCCT"], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_skin_stringer_grows_under_the_foot():
+    scene = skin_stringer.run(dx=2.0, dz=4.0, releases=60)
+    history = scene.history
+    assert balanced(history)
+    grown = float(history["area[bond]"][-1] - history["area[bond]"][0])
+    assert 50.0 < grown < 400.0
+    released = scene.pairs[0].surface.x[[node for node, _ in scene.cracks[0].released]]
+    assert np.all(np.abs(released[:, 0]) <= skin_stringer.FOOT + 1e-9)
+    scene.close()
 
 
 @pytest.mark.slow
