@@ -14,6 +14,7 @@ from fxcrack.continuum.amplitudes import Amplitude, Integral, Ramp, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
+from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
 from fxcrack.continuum.laminate import Laminate, Ply
@@ -158,6 +159,7 @@ __all__ = [
     "FiniteStrain",
     "FrontLine",
     "FxcrackError",
+    "GeneralisedPlaneStrain",
     "History",
     "Inertia",
     "InputError",

@@ -17,6 +17,7 @@ from fxcrack.continuum.conserving import conserving
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.elastic import Elastic
 from fxcrack.continuum.follower_pressure import FollowerPressure
+from fxcrack.continuum.generalised_plane_strain import shared_unknowns
 from fxcrack.continuum.inertia import Inertia, InertiaForces
 from fxcrack.continuum.loads import Load, Pressure
 from fxcrack.continuum.neo_hookean import NeoHookeanBodies
@@ -98,6 +99,31 @@ def _check_shells(loads: Sequence[Load]) -> None:
         )
 
 
+def _check_section(
+    continuum: Continuum, effects: Sequence[Any], loads: Sequence[Load], finite: bool
+) -> None:
+    """Refuse what generalised plane strain does not have."""
+    if not continuum.layout.shared:
+        return
+    for load in filter(_follows, loads):
+        raise InputError(
+            f"pressure '{load.title}': GeneralisedPlaneStrain is for small strain, in which a "
+            "pressure keeps its direction; leave out follows"
+        )
+    if finite:
+        raise InputError(
+            "GeneralisedPlaneStrain is for small strain; leave out FiniteStrain() and NeoHookean, "
+            "or use PlaneStrain or a Solid"
+        )
+    inertia = next((e for e in effects if isinstance(e, Inertia)), None)
+    if inertia is not None and inertia.velocity is not None and inertia.rayleigh[1]:
+        raise InputError(
+            "GeneralisedPlaneStrain: bodies with a velocity at the start and damping by stiffness "
+            "have no first acceleration, as the strain out of the plane has no mass; use damping "
+            "by mass, Inertia(rayleigh=(r, 0.0)), or begin at rest"
+        )
+
+
 def plan(
     continuum: Continuum,
     effects: Sequence[Any],
@@ -127,6 +153,10 @@ def plan(
             "Plastic is a law for small strain and cannot stand beside finite strain; leave out "
             "FiniteStrain() and NeoHookean, or use an elastic material"
         )
+    _check_section(continuum, effects, loads, finite)
+    if continuum.layout.shared:
+        names = ", ".join(s.title for s in shared_unknowns(continuum.model))
+        on.append(f"generalised plane strain: {names} of the whole section")
     if finite:
         on.append("finite strain: large rotations and strains of the bodies")
         why.append("finite strain makes the bodies nonlinear")

@@ -22,6 +22,7 @@ from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint, Coupling, Equation
 from fxcrack.continuum.foundation import Foundation, Stabilise, check_stabilise
+from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import (
     Axisymmetric,
@@ -45,6 +46,7 @@ from fxcrack.continuum.loads import (
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry
 from fxcrack.continuum.section import Section
+from fxcrack.continuum.section_loads import section_loads, section_monitors
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
@@ -94,7 +96,7 @@ class SceneInput:
             "Scene",
             "model",
             self.model,
-            (PlaneStrain, PlaneStress, Axisymmetric, Solid, Shell),
+            (PlaneStrain, PlaneStress, GeneralisedPlaneStrain, Axisymmetric, Solid, Shell),
             "Solid()",
         )
         self._take_list("supports", (Displacement, Clamp, Symmetry, Rotation, Coupling, Equation))
@@ -204,7 +206,9 @@ def compose(given: SceneInput) -> Analysis:
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
-    parts = continuum, pairs, supports, loads, list(given.monitors)
+    loads = [*section_loads(continuum), *loads]  # those of a temperature come last
+    monitors: list[Any] = [*given.monitors, *section_monitors(continuum)]
+    parts = continuum, pairs, supports, loads, monitors
     foundation = None if given.stabilise is None else Foundation(continuum, given.stabilise)
     solver: Solver
     if chosen.solver == "linear":

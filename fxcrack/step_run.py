@@ -20,7 +20,7 @@ from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.history import Details, Row
 from fxcrack.interface.front import why_no_tip
 from fxcrack.interface.set_motions import warn_of_turns
-from fxcrack.interface.supports import tell_of_held_bonds
+from fxcrack.interface.supported_slaves import tell_of_held_bonds
 from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.explicit import ExplicitSolver
@@ -82,7 +82,7 @@ def check_step(
                 f"{type(step).__name__} steps of nonlinear or moving bodies, whose bonds hold "
                 "exactly"
             )
-    effects, why = analysis.effects, analysis.plan.why
+    effects = analysis.effects
     if isinstance(analysis.solver, ExplicitSolver):
         raise InputError(
             f"{type(step).__name__}: this scene has moved by explicit dynamics, and other "
@@ -92,11 +92,6 @@ def check_step(
         raise InputError(
             "Dynamic moves bodies that have inertia, and the scene has none; write "
             "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
-        )
-    if isinstance(step, Cycles) and not analysis.linear:
-        raise InputError(
-            "fatigue steps need linear bodies, but this scene takes the nonlinear solver "
-            f"({'; '.join(why)}); leave that effect out, or run Static steps"
         )
 
 

@@ -13,6 +13,7 @@ from petsc4py import PETSc
 from fxcrack.base import compat
 from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import raise_on_all_ranks
+from fxcrack.condensation.shared_columns import SharedColumns
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.load_vectors import load_vector, monitor_weights
 from fxcrack.continuum.loads import Load, Monitor
@@ -89,18 +90,25 @@ class BorderedMatrix:
         *,
         renewable: bool = False,
     ) -> None:
-        self._transform = coordinates.transform
+        self._transform = coordinates.sparse
         self._inner: PETSc.Mat | None = None  # without borders, where that is another matrix
         self._where: Ints = np.zeros(0, dtype=np.int64)  # its entries among those of the whole
-        inner = _with_springs(stiffness.ptap(coordinates.transform), coordinates)
+        self._where_shared: Ints = self._where  # likewise those of shared unknowns
+        inner = _with_springs(stiffness.ptap(coordinates.sparse), coordinates)
         self.on_retained = np.zeros((coordinates.n_retained, len(borders)))
-        if not borders:
+        self._shared = SharedColumns(coordinates) if len(coordinates.shared) else None
+        if not borders and self._shared is None:
             self.matrix = inner
             return
         comm = compat.plain_comm(inner.getComm().tompi4py())
         shape, _ = inner.getSizes()
         indptr, indices, data = inner.getValuesCSR()
         parts: list[Any] = [sp.csr_matrix((data, indices, indptr), shape=shape)]
+        shared = np.zeros(0)
+        if self._shared is not None:
+            shared = self._shared.values(stiffness)
+            places = self._shared.rows, self._shared.columns
+            parts.append(sp.coo_matrix((shared, places), shape=shape))
         parts += self._border_parts(inner, coordinates, borders, comm)
         comm.Bcast(self.on_retained)
         if renewable:  # zeros are stored as well: they may not be zero next time
@@ -110,7 +118,7 @@ class BorderedMatrix:
             )
             total = sp.coo_matrix((value, (row, col)), shape=shape).tocsr()
         else:
-            total = sum(parts[1:], parts[0])
+            total = sum(parts[1:], parts[0]).tocsr()
         total.sort_indices()
         structure = tuple(x.astype(PETSc.IntType) for x in (total.indptr, total.indices))
         self.matrix = PETSc.Mat().createAIJ(
@@ -128,6 +136,10 @@ class BorderedMatrix:
         self._where = np.searchsorted(all_, own)
         self._borders = total.data
         self._borders[self._where] -= data  # the borders alone are left
+        if self._shared is not None:
+            theirs = self._shared.rows * shape[1] + self._shared.columns
+            self._where_shared = np.searchsorted(all_, theirs)
+            self._borders[self._where_shared] -= shared
 
     def _border_parts(
         self,
@@ -170,6 +182,8 @@ class BorderedMatrix:
         stiffness.ptap(self._transform, result=self._inner)
         data = self._borders.copy()
         data[self._where] += self._inner.getValuesCSR()[2]
+        if self._shared is not None:
+            data[self._where_shared] += self._shared.values(stiffness)
         self.matrix.setValuesCSR(*self._structure, data)
         self.matrix.assemble()
 

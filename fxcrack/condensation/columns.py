@@ -197,7 +197,7 @@ class SchurColumns:
 
     def destroy(self) -> None:
         """Free the transformation; collective."""
-        self.coordinates.transform.destroy()
+        self.coordinates.destroy()
 
 
 def _split(

@@ -372,4 +372,4 @@ class DirectCondensation:
         self._drop_inner()
         self._bordered.destroy()
         if not keep_transform:
-            self.coordinates.transform.destroy()
+            self.coordinates.destroy()

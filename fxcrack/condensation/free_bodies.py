@@ -127,8 +127,8 @@ class FreeBodies:
                 continue
             direction = frame[rows, :, axis]
             slave, master = nodes.find(pair.surface.dofs[rows]), nodes.find(pair.masters[rows])
-            on_slave = _points(moved[slave], pair.surface.point_maps, rows)
-            on_master = _points(moved[master], pair.master_maps, rows)
+            on_slave = _points(moved[slave], pair.surface.point_maps, rows, layout.gdim)
+            on_master = _points(moved[master], pair.master_maps, rows, layout.gdim)
             weights = pair.weights[rows]
             here = np.arange(len(rows))
             own = np.einsum("nc,ncm->nm", direction, on_slave)
@@ -262,11 +262,11 @@ class FreeBodies:
             )
 
 
-def _points(values: Array, maps: Array | None, rows: Ints) -> Array:
+def _points(values: Array, maps: Array | None, rows: Ints, gdim: int) -> Array:
     """Displacements of surface points per motion, shape (n, ..., gdim, n_motions)."""
-    return (
-        values if maps is None else np.asarray(np.einsum("...cj,...jm->...cm", maps[rows], values))
-    )
+    if maps is None:
+        return values[..., :gdim, :]
+    return np.asarray(np.einsum("...cj,...jm->...cm", maps[rows], values))
 
 
 def _reduced(rows: Array, n: int) -> Array:

@@ -54,7 +54,8 @@ def motions_of(continuum: Continuum, body: Ints, centre: Array, size: Array) -> 
         motions.append(layout.rigid_motion(np.tile([0.0, 1.0], (len(s), 1)), still))
     else:
         motions += [layout.rigid_motion(np.tile(e, (len(s), 1)), still) for e in np.eye(gdim)]
-        planes = [(0, 1)] if gdim == 2 else [(0, 1), (1, 2), (0, 2)]
+        # a section that turns about an axis in its plane shears
+        planes = [(0, 1)] if continuum.mesh.gdim == 2 else [(0, 1), (1, 2), (0, 2)]
         for i, j in planes:
             turn = np.zeros((len(s), gdim))
             turn[:, i], turn[:, j] = -s[:, j], s[:, i]
@@ -96,7 +97,7 @@ def ways(free: Array) -> str:
     Args:
         free: Coefficients of the rigid motions, shape (n_motions, n_free), orthonormal columns.
     """
-    names = {1: ["y"], 3: ["x", "y"], 6: ["x", "y", "z"]}[len(free)]
+    names = {1: ["y"], 3: ["x", "y"], 4: ["x", "y", "z"], 6: ["x", "y", "z"]}[len(free)]
     moves = [n for n, row in zip(names, free, strict=False) if row @ row > 1.0 - 1e-6]
     words = [f"free to move along {' and '.join(moves)}"] if moves else []
     if free.shape[1] > len(moves):

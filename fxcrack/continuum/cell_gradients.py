@@ -18,7 +18,8 @@ class CellGradients:
     """Gradients in the cells that this rank owns, or in some of them.
 
     Attributes:
-        gradient: du_i/dx_j at the middle of each cell, shape (n_cells, gdim, gdim).
+        gradient: du_i/dx_j at the middle of each cell, shape (n_cells, gdim, gdim);
+            nothing changes out of the plane of generalised plane strain.
         volume: Volume of each cell, or its area, by the Jacobian there, shape (n_cells,); of
             several dimensions only up to a common factor.
         nodes: Nodes of each cell on this rank, ghosts included, shape (n_cells, n_nodes).
@@ -37,20 +38,22 @@ class CellGradients:
             displacement: Of the dofs that this rank owns, shape (n_local,), length.
             every: Distance of the cells that are looked at in their numbering; 1 takes all.
         """
-        domain, gdim = continuum.mesh.domain, continuum.gdim
+        domain, gdim, flat = continuum.mesh.domain, continuum.gdim, continuum.mesh.gdim
         u = fem.Function(continuum.space)
         u.x.array[: len(displacement)] = displacement
         u.x.scatter_forward()
         n = int(domain.topology.index_map(continuum.mesh.tdim).size_local)
         nodes = np.asarray(continuum.space.dofmap.list)[:n:every].astype(np.int64)
-        values = u.x.array.reshape(-1, gdim)[nodes]
-        x = domain.geometry.x[compat.geometry_dofmap(domain)[:n:every]][:, :, :gdim]
+        values = continuum.layout.displacements(u.x.array)[nodes]
+        x = domain.geometry.x[compat.geometry_dofmap(domain)[:n:every]][:, :, :flat]
         cell = getattr(basix.CellType, domain.topology.cell_name())
         middle = basix.geometry(cell).mean(axis=0)[None]
         jacobian = np.einsum("cni,jn->cij", x, _shapes(cell, continuum.mesh.order, middle))
         moved = np.einsum("cni,jn->cij", values, _shapes(cell, continuum.order, middle))
         volume = np.abs(np.linalg.det(jacobian))
-        return cls(moved @ np.linalg.inv(jacobian), volume, nodes)
+        gradient = np.zeros((len(nodes), gdim, gdim))
+        gradient[:, :, :flat] = moved @ np.linalg.inv(jacobian)
+        return cls(gradient, volume, nodes)
 
 
 def _shapes(cell: basix.CellType, order: int, at: Array) -> Array:

@@ -30,6 +30,7 @@ from fxcrack.continuum.cell_assembly import add_matrices, cell_pattern
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.continuum.face import Face
+from fxcrack.continuum.generalised_plane_strain import shared_unknowns
 from fxcrack.continuum.kinematics import Axisymmetric, Model, Shell
 from fxcrack.continuum.loads import Field
 from fxcrack.continuum.materials import Material, stiffness_of
@@ -64,6 +65,7 @@ class Continuum:
         temperature: Temperature of the bodies; ``None`` for none.
 
     Attributes:
+        gdim: Components of a displacement: those of the mesh, in generalised plane strain three.
         space: Displacement space.
         layout: Unknowns of its nodes and their numbers.
         x: UFL position.
@@ -92,9 +94,9 @@ class Continuum:
         order: int | None = None,
         temperature: Temperature | None = None,
     ) -> None:
-        if model.gdim != mesh.gdim:
+        if model.mesh_gdim != mesh.gdim:
             raise InputError(
-                f"{type(model).__name__} needs a mesh of dimension {model.gdim}, "
+                f"{type(model).__name__} needs a mesh of dimension {model.mesh_gdim}, "
                 f"but mesh '{mesh.name}' has dimension {mesh.gdim}"
             )
         if model.tdim != mesh.tdim:
@@ -121,11 +123,14 @@ class Continuum:
         self.comm = mesh.comm
         collective_garbage.collect(mesh.comm)
         collective_garbage.watch(self, mesh.comm, mesh.domain.comm)
-        self.gdim = mesh.gdim
+        self.gdim = model.gdim
         n = model.n_unknowns
         self.space = fem.functionspace(mesh.domain, ("Lagrange", self.order, (n,)))
         n_owned = int(self.space.dofmap.index_map.size_local)
-        self.layout = DofLayout(self.comm, self.gdim, n_owned, n)
+        shared = shared_unknowns(model)
+        self.layout = DofLayout(
+            self.comm, self.gdim, n_owned, n, shared=[s.unknown for s in shared]
+        )
         self.x = ufl.SpatialCoordinate(mesh.domain)
         weight = model.weight(self.x)
         self.weight = (
@@ -251,7 +256,7 @@ class Continuum:
 
     def _check_shell(self, name: str) -> None:
         """Refuse a continuum shell that this continuum cannot hold."""
-        if self.gdim != 3:
+        if self.mesh.gdim != 3:
             raise InputError(
                 f"ContinuumShell of '{name}': it needs a mesh of hexahedra, in 3-D, and "
                 f"mesh '{self.mesh.name}' is plane; give a solid material"
@@ -412,7 +417,7 @@ class Continuum:
             a: Acceleration, or another motion, of all unknowns.
             v: Test function.
         """
-        return density * ufl.inner(a, v)
+        return density * ufl.inner(self.displacement(a), self.displacement(v))
 
     def positions(self) -> Array:
         """Positions of the local displacement nodes, owned first, shape (n, 3), length."""

@@ -19,6 +19,8 @@ as further unknowns, has Z = z 1: u_point = u + z w.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
@@ -29,16 +31,17 @@ from fxcrack.continuum.shell_joints import NO_JOINTS
 
 
 class DofLayout:
-    """Dof layout of nodes whose unknowns are their displacement components alone: solids.
+    """Dof layout of nodes whose own unknowns are their displacement components alone: solids.
 
-    Other bodies derive from it and say what their further unknowns do: :meth:`point_maps` and
-    :meth:`rigid_motion`.
+    Further unknowns of solids have one value for all nodes (``shared``). Other bodies derive from
+    it and say what their further unknowns do: :meth:`point_maps` and :meth:`rigid_motion`.
 
     Args:
         comm: Communicator that objects may be sent on.
         gdim: Components of a displacement, 2 or 3.
         n_owned: Nodes that this rank owns.
         n_unknowns: Unknowns of a node, ``gdim`` by default.
+        shared: Which of them have one value for all nodes.
 
     Attributes:
         first_nodes: First global node of each rank, then the number of all nodes, shape
@@ -47,15 +50,23 @@ class DofLayout:
         n_local: Dofs that this rank owns.
         n_global: Dofs of all ranks.
         offset: First global dof of this rank.
+        shared: Unknowns that have one value for all nodes, the numbers of a whole section.
         joints: Nodes that are kept together without an interface: kinks and T joints of shells.
     """
 
     def __init__(
-        self, comm: MPI.Intracomm, gdim: int, n_owned: int, n_unknowns: int | None = None
+        self,
+        comm: MPI.Intracomm,
+        gdim: int,
+        n_owned: int,
+        n_unknowns: int | None = None,
+        *,
+        shared: Sequence[int] = (),
     ) -> None:
         self.comm = comm
         self.gdim = gdim
         self.n_unknowns = gdim if n_unknowns is None else n_unknowns
+        self.shared = tuple(shared)
         self.n_owned = n_owned
         counts = np.zeros(comm.size, dtype=np.int64)
         comm.Allgather(np.array([n_owned], dtype=np.int64), counts)
@@ -105,6 +116,15 @@ class DofLayout:
         """Numbers on this rank of global nodes that it owns, shape of the nodes."""
         return np.asarray(nodes - self.first_node)
 
+    @property
+    def shared_owner(self) -> int:
+        """Rank whose first node holds the unknowns that all nodes share: the first with a node."""
+        return int(np.argmax(np.diff(self.first_nodes) > 0))
+
+    def shared_dof(self, unknown: int) -> int | None:
+        """Owned dof that stands for a shared unknown; ``None`` on ranks that do not hold it."""
+        return unknown if self.comm.rank == self.shared_owner else None
+
     def point_maps(self, name: str | Face, nodes: npt.NDArray[np.integer]) -> Array | None:
         """P at nodes of a named surface: displacement of its points per unknown of their nodes.
 
@@ -129,7 +149,9 @@ class DofLayout:
         Returns:
             Shape (n_local,).
         """
-        return np.asarray(displacement.ravel())
+        out = np.zeros((len(displacement), self.n_unknowns))
+        out[:, : self.gdim] = displacement
+        return out.ravel()
 
 
 __all__ = ["DofLayout"]

@@ -103,8 +103,9 @@ class Foundation(Term):
 
     def energy(self, u: fem.Function) -> Any:
         """Energy stored."""
-        weight = self._continuum.weight
-        return sum(0.5 * k * ufl.inner(u, u) * weight * dx for k, dx in self._parts)
+        c = self._continuum
+        moved = c.displacement(u) if c.layout.shared else u  # of shells the director as well
+        return sum(0.5 * k * ufl.inner(moved, moved) * c.weight * dx for k, dx in self._parts)
 
     def add_to(self, matrix: PETSc.Mat) -> None:
         """Add the stiffness to that of linear bodies; collective."""

@@ -208,7 +208,7 @@ class InertiaForces(Term):
 
     def _start(self, velocity: Any) -> None:
         gdim = self._continuum.gdim
-        if len(velocity) != gdim:
+        if len(velocity) not in (gdim, self._continuum.mesh.gdim):
             raise InputError(f"Inertia: velocity has {len(velocity)} components, {gdim} needed")
         comm = self._continuum.comm
         for i, v in enumerate(velocity):

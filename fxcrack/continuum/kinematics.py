@@ -17,12 +17,14 @@ import ufl
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import keep, number
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 
 
 @dataclass(frozen=True)
 class _Plane:
     thickness: float = 1.0
     gdim: ClassVar[int] = 2
+    mesh_gdim: ClassVar[int] = 2
     tdim: ClassVar[int] = 2
     n_unknowns: ClassVar[int] = 2
     labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "xy")
@@ -85,6 +87,7 @@ class Axisymmetric:
     """
 
     gdim: ClassVar[int] = 2
+    mesh_gdim: ClassVar[int] = 2
     tdim: ClassVar[int] = 2
     n_unknowns: ClassVar[int] = 2
     labels: ClassVar[tuple[str, ...]] = ("rr", "zz", "tt", "rz")
@@ -117,6 +120,7 @@ class Solid:
     """Three-dimensional body."""
 
     gdim: ClassVar[int] = 3
+    mesh_gdim: ClassVar[int] = 3
     tdim: ClassVar[int] = 3
     n_unknowns: ClassVar[int] = 3
     labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "yz", "xz", "xy")
@@ -168,6 +172,7 @@ class Shell:
 
     enhanced_membrane: bool = False
     gdim: ClassVar[int] = 3
+    mesh_gdim: ClassVar[int] = 3
     tdim: ClassVar[int] = 2
     n_unknowns: ClassVar[int] = 6
     stress_labels: ClassVar[tuple[str, ...]] = ("xx", "yy", "zz", "yz", "xz", "xy")
@@ -181,7 +186,7 @@ class Shell:
         return np.ones(len(x))
 
 
-Model = PlaneStrain | PlaneStress | Axisymmetric | Solid
+Model = PlaneStrain | PlaneStress | GeneralisedPlaneStrain | Axisymmetric | Solid
 """Models whose strains are functions of the gradient of the displacement."""
 
 

@@ -45,6 +45,15 @@ class NodalLoad(Protocol):
         """Nodal forces at amplitude 1; collective; the caller destroys the vector."""
 
 
+class Weights(Protocol):
+    """A monitor that knows its weights, such as the strain out of the plane of a section."""
+
+    title: str
+
+    def weights(self, continuum: Continuum) -> Array:
+        """Weights of the owned dofs, shape (n_local,)."""
+
+
 class LoadPattern:
     """Nodal values on the owned dofs, kept where they differ from zero.
 
@@ -95,7 +104,8 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad | NodalLoad) -> P
         raise InputError(f"load '{load.title}': only shells take moments; apply a couple of forces")
     if isinstance(load, PointForce):
         return _point_force(continuum, load.where, load.value, load.title)
-    v = continuum.displacement(ufl.TestFunction(continuum.space))
+    unknowns = ufl.TestFunction(continuum.space)
+    v = continuum.displacement(unknowns)
     if isinstance(load, Traction):
         ds = continuum.surface(load.where)
         form = ufl.inner(_vector(continuum, load.value, load.title), v) * continuum.weight * ds
@@ -103,26 +113,29 @@ def load_vector(continuum: Continuum, load: Load | ThermalLoad | NodalLoad) -> P
         ds = continuum.surface(load.where)
         normal = ufl.FacetNormal(continuum.mesh.domain)
         value = continuum.field(load.value, f"load '{load.title}'")
-        form = -ufl.inner(value * normal, v) * continuum.weight * ds
+        along = ufl.as_vector([v[i] for i in range(continuum.mesh.gdim)])
+        form = -ufl.inner(value * normal, along) * continuum.weight * ds
     elif isinstance(load, BodyForce):
         value = _vector(continuum, load.value, load.title)
         form = ufl.inner(value, v) * continuum.weight * continuum.volume(load.where)
     else:
-        form = load_form(continuum, load, v)
+        form = load_form(continuum, load, unknowns)
     vector = dolfinx.fem.petsc.assemble_vector(fem.form(form))
     vector.ghostUpdate(addv=PETSc.InsertMode.ADD, mode=PETSc.ScatterMode.REVERSE)
     return vector
 
 
-def monitor_weights(continuum: Continuum, monitor: Monitor) -> Array:
+def monitor_weights(continuum: Continuum, monitor: Monitor | Weights) -> Array:
     """Weights of the owned dofs in a monitored value, shape (n_local,); collective.
 
     Raises:
         InputError: The direction has another number of components, or the group does not fit.
     """
+    if hasattr(monitor, "weights"):
+        return np.asarray(monitor.weights(continuum))
     out = np.zeros(continuum.n_local)
     for term in monitor.terms:
-        if len(term.direction) != continuum.gdim:
+        if len(term.direction) not in _components(continuum):
             raise InputError(
                 f"Monitor('{term.title}'): direction has {len(term.direction)} components, "
                 f"{continuum.gdim} are needed"
@@ -134,15 +147,21 @@ def monitor_weights(continuum: Continuum, monitor: Monitor) -> Array:
     return out
 
 
+def _components(continuum: Continuum) -> tuple[int, ...]:
+    """Numbers of components a vector may have: those in the plane of a section are enough."""
+    return (continuum.gdim, continuum.mesh.gdim)
+
+
 def _check_components(continuum: Continuum, value: tuple[Field, ...], title: str) -> None:
     given = len(value) if hasattr(value, "__len__") else "no list of"
-    if given != continuum.gdim:
+    if given not in _components(continuum):
         raise InputError(f"load '{title}': {given} components given, {continuum.gdim} needed")
 
 
 def _vector(continuum: Continuum, value: tuple[Field, ...], title: str) -> Any:
     _check_components(continuum, value, title)
-    return ufl.as_vector([continuum.field(v, f"load '{title}'") for v in value])
+    given = [*value, *[0.0] * (continuum.gdim - len(value))]
+    return ufl.as_vector([continuum.field(v, f"load '{title}'") for v in given])
 
 
 def _point_force(

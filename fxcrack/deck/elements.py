@@ -72,7 +72,9 @@ _REFUSED = (
      "or tetrahedra"),
     (r"C3D5", "pyramids are not available; use hexahedra or tetrahedra"),
     (r"COH", "cohesive elements are not available; use *DEBOND along the two surfaces they join"),
-    (r"CPEG|CGAX", "generalised plane strain and twist are not available; use CPE or CAX elements"),
+    (r"CPEG", "generalised plane strain is not read from decks; use CPE elements, or "
+     "GeneralisedPlaneStrain in a script"),
+    (r"CGAX", "twist of axisymmetric bodies is not available; use CAX elements"),
     (r"(B|PIPE|ELBOW)[23]", "beams are not available; use solid elements"),
     (r"T[23]D", "trusses are not available; use solid elements"),
     (r"M3D|SFM|MAX|MGAX", "membranes and surface elements are not available; use solid elements"),

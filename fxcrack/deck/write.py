@@ -23,6 +23,7 @@ from fxcrack.continuum.amplitudes import Amplitude, AmplitudeLike, SmoothStep
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.couplings import Coupling, Equation
 from fxcrack.continuum.face import Face
+from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import (
@@ -134,6 +135,8 @@ class _Writer:
     def lines(self, steps: Sequence[Static | Cycles | Explicit | DeckStep]) -> list[str]:
         """The whole deck."""
         given = self.scene.input
+        if isinstance(given.model, GeneralisedPlaneStrain):
+            refuse("the model GeneralisedPlaneStrain")
         if given.stabilise is not None:
             refuse("the argument stabilise of the scene")
         if given.order is not None and given.order != self.scene.mesh.order:

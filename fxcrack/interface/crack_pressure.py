@@ -167,7 +167,7 @@ def _held(pair: Pair, continuum: Continuum, supports: Supports) -> Bools:
     """
     nodes = InterfaceNodes.of_pairs(continuum.layout, [pair])
     columns, _ = supports.at_nodes(nodes)
-    free = columns[nodes.find(pair.surface.dofs)] < 0
+    free = columns[nodes.find(pair.surface.dofs), : continuum.gdim] < 0
     along = np.where(free, np.abs(pair.frames[:, :, 0]), 0.0).max(axis=1)
     return np.asarray(pair.bonded & (along < _ACROSS))
 

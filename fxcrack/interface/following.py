@@ -169,9 +169,11 @@ class _Rows:
         first = couplings[0]
         layout, gdim = self._layout, self._layout.gdim
         owner = f"Coupling('{first.title}')"
-        if len(first.point) != gdim:
+        # a point of a section lies at z = 0
+        dim = self._continuum.mesh.gdim
+        if len(first.point) not in (dim, gdim):
             raise InputError(
-                f"{owner}: point has {len(first.point)} coordinates in {gdim} dimensions"
+                f"{owner}: point has {len(first.point)} coordinates in {dim} dimensions"
             )
         nodes, x, directors, columns, _ = self._nodes(first.where)
         unknowns, motions, dofs = coupled_motions(layout, first, nodes, x, directors)

@@ -37,7 +37,7 @@ itself; a bonded slave node projects onto the master surface within the search t
 (:mod:`fxcrack.interface.pairing`); where a support holds a displacement component of a bonded
 slave node, it holds its masters in the same way. The frame's tangent then lies along that
 component, and this jump is held at zero and carries no bond force
-(:mod:`fxcrack.interface.supports`).
+(:mod:`fxcrack.interface.supported_slaves`).
 
 Columns of T, in this order on each rank:
 
@@ -50,6 +50,9 @@ jump has an inner coordinate beside it, the elongation e of the spring
 (:mod:`fxcrack.interface.bond_springs`): R (e + delta) in place of R delta. T has more columns than
 rows then.
 
+Unknowns that all nodes share (the strain out of the plane of generalised plane strain) have one
+inner column together, with ones in the rows of their dofs.
+
 Dofs that follow others by couplings and equations (:mod:`fxcrack.interface.following`) have no
 column of their own but rows of T with the columns of what they follow. The jump of a slave node
 among them is zero where it is bonded and its masters belong to the same rigid set, and is given up
@@ -60,25 +63,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import scipy.sparse as sp
 from petsc4py import PETSc
-from scipy.sparse.csgraph import connected_components
 
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.bond_springs import Springs, assembled_springs
 from fxcrack.interface.constrained_slaves import drop_constrained
-from fxcrack.interface.following import Following
-from fxcrack.interface.hierarchy import links_in_chain
+from fxcrack.interface.follower_rows import Link, constraint_rows, interface_rows
 from fxcrack.interface.joints import joint_terms
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
-from fxcrack.interface.supports import Supports, align_frames, check_slaves
+from fxcrack.interface.shared_unknowns import SharedUnknowns
+from fxcrack.interface.supported_slaves import align_frames, check_slaves
+from fxcrack.interface.supports import Supports
 
 FIXED, FREE, RETAINED = 0, 1, 2
 """Roles of a jump component: always zero, free in the continuum, or retained."""
@@ -90,6 +91,8 @@ class JumpCoordinates:
 
     Attributes:
         transform: T, PETSc AIJ, shape (n_global, n_coordinates).
+        sparse: T without the columns of unknowns that all nodes share; T itself without them.
+        shared: Columns of these, shape (n_shared,).
         frames: Frame of each slave node per pair, aligned with supports, (n_nodes, gdim, gdim).
         held: Jump components that supports hold at zero, per pair, shape (n_nodes, gdim).
         index: Number among the retained jumps of each jump component per pair, -1 where it is not
@@ -105,6 +108,8 @@ class JumpCoordinates:
     """
 
     transform: PETSc.Mat
+    sparse: PETSc.Mat
+    shared: Ints
     frames: list[Array]
     held: list[Bools]
     index: list[Ints]
@@ -120,6 +125,12 @@ class JumpCoordinates:
     def n_last(self) -> int:
         """Retained, support and border columns together."""
         return self.n_retained + self.n_supports + self.n_borders
+
+    def destroy(self) -> None:
+        """Free the matrices; collective."""
+        self.transform.destroy()
+        if self.sparse is not self.transform:
+            self.sparse.destroy()
 
 
 def global_vectors(index: Ints, frames: Array, values: Array) -> Array:
@@ -181,7 +192,7 @@ def build_coordinates(
     }
     joined, *joint_entries = joint_terms(layout.joints, nodes, which, slaves)
     links = [
-        _Link(pair, np.flatnonzero(j), nodes.find(pair.surface.dofs[j]))
+        Link(pair, np.flatnonzero(j), nodes.find(pair.surface.dofs[j]))
         for pair, j in zip(pairs, jumped, strict=True)
     ]
 
@@ -213,6 +224,8 @@ def build_coordinates(
     for link, role, yields in zip(links, roles, elastic, strict=True):
         follows[link.nodes, :gdim] = True
         free_jump[link.nodes, :gdim] = ((role == FREE) | yields)[link.slaves]
+    shared = SharedUnknowns(layout, supports)
+    shared.keep_one(own)
     local = layout.dofs(nodes.local)
     follows_here = follows[nodes.mine]
     own[local[follows_here]] = free_jump[nodes.mine][follows_here]
@@ -234,12 +247,13 @@ def build_coordinates(
     n_columns = int(counts.sum()) + extra
     column = np.full(layout.n_local, -1, dtype=np.int64)
     column[own] = start + np.arange(n_inner)
+    at_shared = shared.spread(column, first + n_retained)
 
     composed: tuple[Ints, sp.csr_matrix] | None = None
     if following is not None:
-        their = _constraint_rows(following, layout, supports, column, first + n_retained, n_columns)
+        their = constraint_rows(following, layout, supports, column, first + n_retained, n_columns)
         composed = following.dofs, their
-    rows = _interface_rows(
+    rows = interface_rows(
         nodes,
         links,
         frames,
@@ -259,13 +273,17 @@ def build_coordinates(
         of_followers = sp.vstack(
             [of_followers, composed[1][following.mine(layout)[0]]], format="csr"
         )
-    transform = _assemble(
-        layout, supports, column, followers, of_followers, first + n_retained,
-        (n_inner + (extra if comm.rank == 0 else 0), n_columns),
-    )  # fmt: skip
+    single = (supports.which >= 0) | (column >= 0)
+    single[followers] = False
+    size = n_inner + (extra if comm.rank == 0 else 0), n_columns
+    given = layout, supports, column, followers, of_followers, first + n_retained, size
+    transform = _assemble(single, *given)
+    sparse = transform
+    if layout.shared:
+        sparse = _assemble(shared.without(single), *given)
     return JumpCoordinates(
-        transform, frames, held, index, n_retained, n_supports, n_borders, n_inner, first,
-        np.flatnonzero(own),
+        transform, sparse, at_shared, frames, held, index, n_retained, n_supports, n_borders,
+        n_inner, first, np.flatnonzero(own),
         _springs(layout, nodes, links, frames, springs, elastic, column),
     )  # fmt: skip
 
@@ -273,7 +291,7 @@ def build_coordinates(
 def _springs(
     layout: DofLayout,
     nodes: InterfaceNodes,
-    links: Sequence[_Link],
+    links: Sequence[Link],
     frames: Sequence[Array],
     springs: Sequence[Array | None],
     elastic: Sequence[Bools],
@@ -302,175 +320,8 @@ def _springs(
     return tuple(out)
 
 
-@dataclass(frozen=True)
-class _Link:
-    """Slave nodes of a pair that have a jump.
-
-    Attributes:
-        pair: The pair.
-        slaves: Which of its slave nodes, shape (n,).
-        nodes: Their rows among the interface nodes, shape (n,).
-    """
-
-    pair: Pair
-    slaves: Ints
-    nodes: Ints
-
-
-def _interface_rows(
-    nodes: InterfaceNodes,
-    links: Sequence[_Link],
-    frames: Sequence[Array],
-    retained: Sequence[Ints],
-    follows: Bools,
-    column: Ints,
-    support: Ints,
-    value: Array,
-    n_columns: int,
-    joined: Sequence[Any],
-    constrained: tuple[Ints, sp.csr_matrix] | None,
-) -> sp.csr_matrix:
-    """Rows of T for the dofs of all interface nodes, chains composed.
-
-    Args:
-        nodes: The interface nodes.
-        links: Slave nodes that have a jump, per pair.
-        frames: Frames of slave nodes per pair, shape (n_nodes, gdim, gdim).
-        retained: Columns of retained jumps per pair, -1 for others, shape (n_nodes, gdim).
-        follows: Dofs that follow other dofs, shape (n_interface_nodes, n_unknowns).
-        column: Columns of the dofs' own, -1 where they have none, same shape.
-        support: Columns of the supports that prescribe dofs, -1 where none does, same shape.
-        value: Entries of these columns, same shape.
-        n_columns: Columns of T.
-        joined: Rows, columns and entries of what the nodes of joints follow.
-        constrained: Global dofs that follow by couplings and equations, ascending, and their rows.
-
-    Returns:
-        Shape (n_unknowns n_interface_nodes, n_columns).
-
-    Raises:
-        InterfaceError: Slaves and masters form a cycle.
-    """
-    layout = nodes.layout
-    n = layout.n_unknowns * len(nodes)
-    follows_flat, own, prescribed = follows.ravel(), column.ravel(), support.ravel()
-    rows = np.flatnonzero(~follows_flat & (own >= 0))
-    # a supported component of a slave moves like its masters', but its reaction is its own
-    held = np.flatnonzero(prescribed >= 0)
-    entries = [(rows, own[rows], np.ones(len(rows))), (held, prescribed[held], value.ravel()[held])]
-    if constrained is not None and len(constrained[0]):
-        dofs, its_rows = constrained
-        here = layout.dofs(nodes.nodes).ravel()
-        at = np.minimum(np.searchsorted(dofs, here), len(dofs) - 1)
-        inside = np.flatnonzero(dofs[at] == here)
-        block = its_rows[at[inside]].tocoo()
-        entries.append((inside[block.row], block.col, block.data))
-    followed: list[tuple[Ints, Ints, Array]] = []
-    if len(joined[0]):
-        followed.append((joined[0], joined[1], joined[2]))
-    for link, frame, jumps in zip(links, frames, retained, strict=True):
-        k, s = link.slaves, link.nodes
-        followed += _followed_unknowns(nodes, link, support[s] < 0)
-        for j in range(layout.gdim):
-            for target in (jumps[k, j], column[s, j]):  # both: a retained jump and its elongation
-                has = target >= 0
-                for c in range(layout.gdim):
-                    entries.append((layout.dof(s[has], c), target[has], frame[k, c, j][has]))
-
-    def matrix(parts: list[tuple[Ints, Ints, Array]], width: int) -> sp.csr_matrix:
-        r, c, v = (np.concatenate(p) for p in zip(*parts, strict=True))
-        keep = v != 0.0
-        return sp.csr_matrix((v[keep], (r[keep], c[keep])), shape=(n, width))
-
-    base = matrix(entries, n_columns)
-    if not followed:
-        return base
-    chain = matrix(followed, n)
-    inside = chain[follows_flat][:, follows_flat]
-    groups, _ = connected_components(inside, directed=True, connection="strong")
-    if groups < inside.shape[0] or inside.diagonal().any():
-        names = ", ".join(f"'{link.pair.title}'" for link in links)
-        raise InterfaceError(
-            f"interfaces {names} form a cycle: a slave node is master of a node that is in turn "
-            "its master; exchange slave and master of one of them, or make one interface of "
-            "surfaces that continue each other, mesh.joined('whole', ['first', 'second'])"
-        )
-    composed = base
-    longest = links_in_chain(link.pair.hierarchy for link in links)
-    for _ in range(longest if not len(joined[0]) else 2 * longest + 1):
-        composed = base + chain @ composed
-    return sp.csr_matrix(composed)
-
-
-def _constraint_rows(
-    following: Following,
-    layout: DofLayout,
-    supports: Supports,
-    column: Ints,
-    support_column: int,
-    n_columns: int,
-) -> sp.csr_matrix:
-    """Rows of T of all dofs that follow by couplings and equations; collective.
-
-    Args:
-        following: These dofs.
-        layout: Unknowns of nodes and their numbers.
-        supports: Prescribed components.
-        column: Column of each owned dof's own, -1 where it has none, shape (n_local,).
-        support_column: First column of the supports.
-        n_columns: Columns of T.
-
-    Returns:
-        Shape (n_following, n_columns), the same on every rank.
-    """
-    held = supports.which >= 0
-    columns = np.where(held, support_column + supports.which, column)
-    entries = np.where(held, supports.value, 1.0)
-    pairs = following.share_masters(layout, np.column_stack([columns.astype(float), entries]))
-    target = pairs[:, 0].astype(np.int64)  # a double holds whole numbers up to 2^53
-    rows = np.arange(len(target))
-    to_columns = sp.csr_matrix((pairs[:, 1], (rows, target)), shape=(len(target), n_columns))
-    first = support_column + len(supports.columns) - supports.n_motions
-    spread = sp.csr_matrix(
-        (np.ones(supports.n_motions), (np.arange(supports.n_motions),
-                                       first + np.arange(supports.n_motions))),
-        shape=(supports.n_motions, n_columns),
-    )  # fmt: skip
-    return sp.csr_matrix(following.matrix @ to_columns + following.prescribed @ spread)
-
-
-def _followed_unknowns(
-    nodes: InterfaceNodes, link: _Link, free: Bools
-) -> list[tuple[Ints, Ints, Array]]:
-    """Blocks W P_m of the masters and -Z_s of the slaves themselves, as rows, columns, entries.
-
-    Args:
-        nodes: The interface nodes, in whose order rows and columns are numbered.
-        link: Slave nodes of a pair.
-        free: Their unknowns that no support prescribes, shape (n, n_unknowns).
-    """
-    layout, pair, k = nodes.layout, link.pair, link.slaves
-    masters, slave_maps = nodes.find(pair.masters[k]), pair.surface.point_maps
-    out = []
-    for c in range(layout.gdim):
-        row = layout.dof(link.nodes, c)
-        follows = np.where(free[:, c], 1.0, 0.0)
-        weights = follows[:, None] * pair.weights[k]
-        blocks = [(c, weights)]
-        if pair.master_maps is not None:
-            maps = pair.master_maps[k, :, c]
-            blocks = [(j, weights * maps[..., j]) for j in range(layout.n_unknowns)]
-        rows = np.broadcast_to(row[:, None], masters.shape).ravel()
-        out += [(rows, layout.dof(masters, j).ravel(), block.ravel()) for j, block in blocks]
-        if slave_maps is not None:
-            out += [
-                (row, layout.dof(link.nodes, j), -follows * slave_maps[k, c, j])
-                for j in range(layout.gdim, layout.n_unknowns)
-            ]
-    return out
-
-
 def _assemble(
+    single: Bools,
     layout: DofLayout,
     supports: Supports,
     column: Ints,
@@ -482,6 +333,8 @@ def _assemble(
     """T from the single-entry rows of ordinary dofs and the rows of dofs that follow others.
 
     Args:
+        single: Owned dofs that have a single entry, shape (n_local,); others that follow none have
+            an empty row.
         layout: Unknowns of nodes and their numbers.
         supports: Prescribed components.
         column: Column of each owned dof's own, -1 where it has none, shape (n_local,).
@@ -490,8 +343,6 @@ def _assemble(
         support_column: First column of the supports.
         size: Columns that this rank owns, and all columns.
     """
-    single = (supports.which >= 0) | (column >= 0)
-    single[followers] = False
     r = np.flatnonzero(single)
     held = supports.which[r] >= 0
     c = np.where(held, support_column + supports.which[r], column[r])

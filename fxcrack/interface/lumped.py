@@ -34,7 +34,8 @@ from fxcrack.base.sparse import Product, by_component
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
-from fxcrack.interface.supports import Supports, align_frames, check_slaves
+from fxcrack.interface.supported_slaves import align_frames, check_slaves
+from fxcrack.interface.supports import Supports
 
 
 @dataclass(frozen=True)

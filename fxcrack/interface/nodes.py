@@ -141,7 +141,8 @@ class JumpGather:
             values: From :meth:`gather`.
             surface: Slave surface of a pair, or one of the master surfaces.
         """
-        return point_displacements(values[self._nodes.find(surface.dofs)], surface.point_maps)
+        found = values[self._nodes.find(surface.dofs)]
+        return point_displacements(found, surface.point_maps, self._nodes.layout.gdim)
 
     def jumps(self, values: Array, pair: Pair, frames: Array) -> Array:
         """Jumps of a pair in its frames; zero at nodes without a master point.
@@ -154,22 +155,25 @@ class JumpGather:
         Returns:
             Shape (n_nodes, gdim), length.
         """
-        masters = point_displacements(values[self._nodes.find(pair.masters)], pair.master_maps)
+        masters = values[self._nodes.find(pair.masters)]
+        masters = point_displacements(masters, pair.master_maps, self._nodes.layout.gdim)
         jump = self.displacements(values, pair.surface)
         jump = jump - np.einsum("nk,nkc->nc", pair.weights, masters)
         jump[~pair.paired] = 0.0
         return np.asarray(np.einsum("nci,nc->ni", frames, jump))
 
 
-def point_displacements(values: Array, maps: Array | None) -> Array:
+def point_displacements(values: Array, maps: Array | None, gdim: int) -> Array:
     """Displacements of surface points.
 
     Args:
         values: Unknowns of their nodes, shape (..., n_unknowns).
-        maps: P at the points, shape (..., gdim, n_unknowns); ``None`` where the unknowns are the
-            displacement.
+        maps: P at the points, shape (..., gdim, n_unknowns); ``None`` where points are nodes.
+        gdim: Components of a displacement.
 
     Returns:
         Shape (..., gdim), length.
     """
-    return values if maps is None else np.asarray(np.einsum("...cj,...j->...c", maps, values))
+    if maps is None:
+        return values[..., :gdim]
+    return np.asarray(np.einsum("...cj,...j->...c", maps, values))

@@ -40,7 +40,8 @@ def coupled_motions(
     """
     gdim = layout.gdim
     r = np.zeros((len(x), 3))
-    r[:, :gdim] = x[:, :gdim] - np.asarray(coupling.point)
+    r[:, :gdim] = x[:, :gdim]
+    r[:, : len(coupling.point)] -= np.asarray(coupling.point)
     axes = np.eye(3)
     turns = [np.cross(axes[i], r) for i in (range(3) if gdim == 3 else (2,))]
     parts, unknowns = [], []
@@ -51,7 +52,7 @@ def coupled_motions(
         shift = np.tile(np.eye(gdim)[c], (len(x), 1))
         parts.append(np.column_stack([shift, *(t[:, c] for t in turns)]))
         unknowns.append(c)
-    if layout.n_unknowns > gdim and coupling.rotations:
+    if layout.n_unknowns > gdim + len(layout.shared) and coupling.rotations:
         for c in range(3):
             turn = [np.cross(axes[i], directors)[:, c] for i in range(3)]
             parts.append(np.column_stack([np.zeros((len(x), 3)), *turn]))

@@ -109,14 +109,15 @@ def interface_fields(
     for _ in range(links_in_chain(pair.hierarchy for pair in pairs) - 1):
         carried = np.zeros_like(direct)
         for pair, s, m, on in zip(pairs, slaves, masters, acting, strict=True):
-            np.add.at(carried, m[on], pair.forces_on_masters(total[s, :gdim])[on])
+            on_masters = pair.forces_on_masters(total[s, :gdim])[on]
+            np.add.at(carried[:, : on_masters.shape[2]], m[on], on_masters)
         total = direct + carried
     return [
         _fields_of(
             analysis,
             p,
-            point_displacements(motion[slaves[p]], pair.surface.point_maps),
-            point_displacements(motion[faces[p]], pair.master_maps),
+            point_displacements(motion[slaves[p]], pair.surface.point_maps, gdim),
+            point_displacements(motion[faces[p]], pair.master_maps, gdim),
             np.where(acting[p][:, None], total[slaves[p], :gdim], 0.0),
             analysis.time if time is None else time,
         )

@@ -40,6 +40,8 @@ class CondensedBodies:
         continuum, forms = self.continuum, self._forms
         if isinstance(continuum, ShellBodies) or continuum.shell_cells:
             return "shells"
+        if continuum.layout.shared:
+            return "generalised plane strain"
         if continuum.founded:
             return "stabilise"
         if any(p.interface.stiffness is not None for p in self._solver.pairs):

@@ -98,9 +98,10 @@ class ContactImpulses:
             self.destroy()
             self._coordinates = coordinates
         if self._mass is None or self._diagonal is None:
-            self._mass = self._inertia.mass_matrix().ptap(coordinates.transform)
+            self._mass = self._inertia.mass_matrix().ptap(coordinates.sparse)
             self._diagonal = self._mass.getDiagonal()
-            zero = self._diagonal.array == 0.0  # of borders, which are no motions
+            # of borders, which are no motions, and of shared unknowns, which have no mass
+            zero = self._diagonal.array == 0.0
             self._diagonal.array[zero] = 1.0
         return self._mass, self._diagonal
 

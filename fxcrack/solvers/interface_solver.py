@@ -121,7 +121,9 @@ class InterfaceSolver(ABC):
         self.system = ContactSystem(np.zeros((n, n)), 0, n, len(loads))
         self.state = Equilibrium(np.zeros(n), np.zeros(0), np.zeros(0), np.zeros(n))
         self._reach = [np.inf] * len(pairs)
-        self._cost: CostModel | ColumnCost = CostModel.guess(continuum.n_global, gdim)
+        self._cost: CostModel | ColumnCost = CostModel.guess(
+            continuum.n_global, continuum.mesh.gdim
+        )
         self._followed: list[Ints] = []
         self._resumed: InterfaceState | None = None
         self._roles: Roles = []
@@ -222,22 +224,6 @@ class InterfaceSolver(ABC):
         if all(name in arrays for name in names):
             # the set it had, so that the history goes on on the same one
             self._resumed_roles = [arrays[name].astype(np.int8) for name in names]
-
-    def undo(self, saved: InterfaceState, rebases: int) -> None:
-        """Return to an earlier state of the interfaces, be the retained jumps others since.
-
-        Collective.
-
-        Args:
-            saved: The state.
-            rebases: Value of :attr:`rebases` then.
-        """
-        if self.rebases == rebases:
-            self.restore_interfaces(saved)
-            return
-        saved.restore_bonds(self.fronts)
-        self._retain(saved)
-        self.rebases += 1
 
     def _retain(self, state: InterfaceState) -> None:
         """Condense onto another set of retained jumps, and carry a state over."""

@@ -83,6 +83,11 @@ class LinearSolver(InterfaceSolver):
                 "CondensedOptions(method='iterative') is not possible with shells, whose stiffness "
                 "against bending and stretching differs too much; leave method out"
             )
+        if options.method == "iterative" and continuum.layout.shared:
+            raise InputError(
+                "CondensedOptions(method='iterative') is not possible in generalised plane strain, "
+                "whose strain out of the plane links all nodes; leave method out"
+            )
         yielding = [p.title for p in pairs if p.interface.stiffness is not None]
         if options.method == "iterative" and yielding:
             raise InputError(
@@ -102,7 +107,7 @@ class LinearSolver(InterfaceSolver):
 
     def _too_large(self) -> bool:
         """Whether a factorisation would not fit the memory, which is logged; collective."""
-        if self.continuum.gdim < 3 or isinstance(self.continuum, ShellBodies):
+        if self.continuum.mesh.gdim < 3 or isinstance(self.continuum, ShellBodies):
             return False
         comm = self.continuum.comm
         reason = too_large_for_direct(self.continuum.n_global, 1e6 * machine_memory_mb(comm))
@@ -247,6 +252,22 @@ class LinearSolver(InterfaceSolver):
     def recall(self, saved: InterfaceState) -> None:
         """Return to an earlier state on the same retained jumps."""
         self.restore_interfaces(saved)
+
+    def undo(self, saved: InterfaceState, rebases: int) -> None:
+        """Return to an earlier state of the interfaces, be the retained jumps others since.
+
+        Collective.
+
+        Args:
+            saved: The state.
+            rebases: Value of :attr:`rebases` then.
+        """
+        if self.rebases == rebases:
+            self.restore_interfaces(saved)
+            return
+        saved.restore_bonds(self.fronts)
+        self._retain(saved)
+        self.rebases += 1
 
     # -- energies and fields -------------------------------------------------------------
 

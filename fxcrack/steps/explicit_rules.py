@@ -75,6 +75,11 @@ def check_bodies(
     """
     if isinstance(continuum, ShellBodies):
         _check_shells(continuum, interfaces)
+    if continuum.layout.shared:
+        raise InputError(
+            "Explicit: the strain out of the plane in GeneralisedPlaneStrain has no mass that "
+            "could move it; use a Dynamic step, or PlaneStrain"
+        )
     if continuum.order != 1:
         raise InputError(
             "Explicit needs first-order elements: row sums of second-order ones give corner nodes "

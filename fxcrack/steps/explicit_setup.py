@@ -10,7 +10,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
-from fxcrack.interface.supports import tell_of_held_bonds
+from fxcrack.interface.supported_slaves import tell_of_held_bonds
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from fxcrack.history import Row
 from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.section_columns import is_section, section_columns
 
 Observer = Callable[[str, Row], None]
 """Called on all ranks with the name of every event and its row of the history."""
@@ -70,15 +71,21 @@ def history_row(analysis: Analysis, event: str) -> Row:
     stored, spent = solver.stored(state), solver.spent()
     work = balance.external_work + solver.extra_work(state)
     row: Row = {"time": float(balance.time), "event": event}
-    for (load, answer, moves), a, r in zip(
-        load_columns(solver), state.loads, state.conjugate, strict=True
+    acting = [*(c.support for c in solver.supports.columns), *solver.loads]
+    for (load, answer, moves), part, a, r in zip(
+        load_columns(solver), acting, state.loads, state.conjugate, strict=True
     ):
+        if is_section(part):
+            continue
         if moves:
             row[load] = float(a)
         row[answer] = float(r)
     # displacements that criteria follow come after those of the user
-    for monitor, value in zip(solver.monitors, system.monitors(state), strict=False):
-        row[f"m[{monitor.title}]"] = float(value)
+    monitored = system.monitors(state)
+    for monitor, value in zip(solver.monitors, monitored, strict=False):
+        if not is_section(monitor):
+            row[f"m[{monitor.title}]"] = float(value)
+    row |= section_columns(solver, state.loads, state.conjugate, monitored)
     for g, v in analysis.at_tips():
         row[f"a[{g.title}]"] = g.extent.length(v.tips)
         row[f"area[{g.title}]"] = g.extent.area(v.tips)

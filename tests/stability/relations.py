@@ -139,8 +139,8 @@ def stepping(c: Combination, base: Result) -> str:
         if result.history is None or result.reason.startswith("refused"):
             continue
         # increments have no row at onset, and release at the end of the one in which f passed 1
-        name = "release" if kind == "increment" else "onset"
-        times[kind] = next((float(r["time"]) for r in result.history if r["event"] == name), 2.0)
+        names = ("release",) if kind == "increment" else ("onset", "unstable")
+        times[kind] = next((float(r["time"]) for r in result.history if r["event"] in names), 2.0)
     event = times["event"]
     off = abs(times.get("path", event) - event)
     early = max(event - times.get("increment", event), 0.0)

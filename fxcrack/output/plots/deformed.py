@@ -108,7 +108,7 @@ def shape(source: Analysis | HasAnalysis, component: str = "von_mises") -> Shape
     cells, facets = outer_facets(continuum)
     facets = facets[:, _OUTLINES[_facet_kind(continuum), continuum.order]]
     border = np.zeros((0, 2, 3))
-    if continuum.gdim == 2:
+    if continuum.mesh.gdim == 2:
         border = x[facets]
         name = continuum.mesh.domain.topology.cell_name()
         n_cells = continuum.mesh.domain.topology.index_map(2).size_local
