@@ -37,8 +37,9 @@ _CHANGING = ("paired", "frames", "gap")
 
 
 def renewed(
-    pair: Pair, bonded: Bools, master: FacetSurface | RigidSurface, u_slave: Array, u_master: Array
-) -> Pair | None:
+    pair: Pair, bonded: Bools, master: FacetSurface | RigidSurface, u_slave: Array,
+    u_master: Array, *, turned: float = np.inf,
+) -> Pair | None:  # fmt: skip
     """A pair with its open nodes projected on the present master surface.
 
     Args:
@@ -48,12 +49,17 @@ def renewed(
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
         u_master: Displacements of the master nodes, shape (master.n_nodes, gdim), length; none,
             shape (0, gdim), of a rigid surface.
+        turned: Angle by which the normal may turn where gaps are too large to close; not of rigid
+            surfaces.
 
     Returns:
-        ``None`` if no gap that may close has changed enough to matter.
+        ``None`` if no gap that may close has changed enough to matter, and no normal has turned too
+        far.
     """
     if pair.hierarchy is not None:
-        found = renewed(pair.by_nodes(), bonded, master, u_slave, u_master)
+        found = renewed(
+            pair.by_nodes(), bonded, master, u_slave, u_master, turned=turned
+        )  # fmt: skip
         return None if found is None else found.by_corners()
     if not isinstance(master, FacetSurface):
         return renewed_on(pair, bonded, u_slave)
@@ -76,8 +82,9 @@ def renewed(
     # by nodes: above a node the facet is one or the other by round-off, its weights are the same
     slid = _change(pair, now.dofs[nodes], new) > _SLIDE
     near = over & (gap < _NEAR * size)
-    slid |= np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _SLIDE
-    if not np.any(near & (slid | ~pair.paired)):
+    turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
+    slid |= turn > _SLIDE
+    if not np.any(near & (slid | ~pair.paired)) and not np.any(over & (turn > turned)):
         return None
     frames, gaps = pair.frames.copy(), pair.gap.copy()
     frames[over] = local_frames(normals, gdim)[over]

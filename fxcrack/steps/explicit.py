@@ -31,7 +31,8 @@ class Explicit:
             first moment and all bonds tied.
         dt: Increment, time; by default the stable one times ``safety``. The increments are made a
             little shorter where that makes them end at the end time.
-        safety: Part of the stable increment that is used.
+        safety: Part of the stable increment that is used. At finite strain the increment follows it
+            as it changes, unless ``dt`` is given.
         rows: Rows of the history, evenly spaced in time up to the end time.
         contact: How faces of interfaces with ``contact=True`` are kept apart: "exact" by the forces
             for which they just touch, "penalty" by a stiffness.
