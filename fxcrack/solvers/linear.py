@@ -122,7 +122,7 @@ class LinearSolver(InterfaceSolver):
         """K; it and the borders are made on first use; collective."""
         if self.stiffness is None:
             start = time.perf_counter()
-            check_held(self.continuum, self.supports)
+            check_held(self.continuum, self.supports, self.pairs)
             self.continuum.compile()
             self.timings.add("compile", start)
             start = time.perf_counter()
