@@ -22,6 +22,7 @@ from fxcrack.demos import (
     fatigue_front,
     friction_enf,
     front3d,
+    half_dcb,
     large_dcb,
     mmb,
     moment_dcb,
@@ -48,6 +49,16 @@ def test_dcb_is_close_to_beam_theory():
     # plane strain is 0.35 % above the theory, the coarse mesh another 0.6 %
     assert all(row[2] == pytest.approx(row[4], rel=0.012) for row in rows)
     assert scene.solver.timings.factorizations == 1
+    assert balanced(scene.history)
+
+
+@pytest.mark.slow
+def test_half_of_a_dcb_costs_half() -> None:
+    (scene, half), (_, whole) = (half_dcb.run(h, dx=2.5, until=32.5) for h in (True, False))
+    for name, part in {"load": 1.0, "G": 1.0, "released": 0.5, "unknowns": 0.5}.items():
+        assert half[name] == pytest.approx(
+            part * whole[name], rel=1e-9
+        )  # the same but for rounding
     assert balanced(scene.history)
 
 

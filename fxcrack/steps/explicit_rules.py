@@ -179,6 +179,12 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 "release=StepRelease(), or use viscosity=0: a progressive release needs none"
             )
     for interface in (*[d.interface for d in debonds], *bonds):
+        if interface.is_rigid:
+            raise InputError(
+                f"interface '{interface.title}': explicit dynamics has no rigid surfaces; hold the "
+                "nodes by Displacement where they stay bonded, model the other body, or use a "
+                "Dynamic step"
+            )
         if interface.normal_only:
             raise InputError(
                 f"interface '{interface.title}': bonds of explicit dynamics hold in all "
@@ -187,7 +193,8 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
         if interface.stiffness == "arms":
             raise InputError(
                 f"interface '{interface.title}': stiffness='arms' is that of shells on surface "
-                "meshes, which Explicit does not have; give 'auto' or three numbers per area"
+                "meshes, whose interfaces Explicit does not have; give 'auto' or three numbers per "
+                "area"
             )
         if interface.pairing == "surface-to-surface":
             raise InputError(
