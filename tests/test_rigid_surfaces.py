@@ -104,6 +104,7 @@ WAYS = {
     "2d": {},
     "progressive": {"order": 2, "release": fx.ProgressiveRelease()},
     "closure": {"criterion": fx.VCCT(GIc=0.2, method="closure")},
+    "mode length": {"criterion": fx.VCCT(GIc=0.2, mode_length=0.5)},
     # the whole body has no contact here: at finite strain its pairs of nodes slide on each other's
     # facets, which moves the opening by 6e-6; on the plane nothing slides
     "finite": {"effects": [fx.FiniteStrain()], "contact": False},
@@ -522,6 +523,8 @@ def test_criteria_that_a_rigid_master_does_not_have() -> None:
     with pytest.raises(InputError, match="says symmetry=True already"):
         fx.Debond(half, fx.CrackOpening(1.0, distance=1.0, symmetry=True))
     assert half.normal_only
+    with pytest.raises(InputError, match="an elastic body on both sides"):
+        fx.Debond(fx.Interface("a", PLANE), fx.VCCT(GIc=1.0, mode_length=0.1))
     with pytest.raises(InputError, match="no direction"):
         fx.RigidPlane((0.0, 0.0), (0.0, 0.0))
     with pytest.raises(InputError, match=r"must be 3 numbers"):

@@ -71,7 +71,8 @@ class RateEvaluator(SofteningEvaluator):
         if criterion.method == "domain":
             self._domain = DomainIntegral(probe, criterion.rings, criterion.reference_length)
         self._modes: ModesAtLength | None = None
-        if criterion.mode_length is not None:
+        # where rates are those of mode I alone no length divides them
+        if criterion.mode_length is not None and not probe.pair.interface.mode_i_only:
             self._modes = ModesAtLength(probe, criterion.mode_length)
         hierarchy = probe.pair.hierarchy
         self._largest_unit = 0 if hierarchy is None else 1 + hierarchy.most_beside()
