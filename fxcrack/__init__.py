@@ -66,6 +66,7 @@ from fxcrack.deck.write import write_deck
 from fxcrack.effects import FiniteStrain
 from fxcrack.history import History
 from fxcrack.interface.definition import Interface
+from fxcrack.interface.rigid import RigidCylinder, RigidPlane, RigidSphere
 from fxcrack.mesh import Mesh, Split, from_dolfinx, mesh_from_gmsh, read_mesh
 from fxcrack.output.fields import FieldSeries, displacement_function, write_fields
 from fxcrack.output.front_line import FrontLine, front_lines
@@ -192,6 +193,9 @@ __all__ = [
     "Reeder",
     "ReleaseLaw",
     "Releases",
+    "RigidCylinder",
+    "RigidPlane",
+    "RigidSphere",
     "Rotation",
     "Scene",
     "Section",

@@ -82,7 +82,7 @@ def check_step(
                 f"{type(step).__name__} steps of nonlinear or moving bodies, whose bonds hold "
                 "exactly"
             )
-    effects, why = analysis.effects, analysis.plan.why
+    effects = analysis.effects
     if isinstance(analysis.solver, ExplicitSolver):
         raise InputError(
             f"{type(step).__name__}: this scene has moved by explicit dynamics, and other "
@@ -92,11 +92,6 @@ def check_step(
         raise InputError(
             "Dynamic moves bodies that have inertia, and the scene has none; write "
             "Scene(..., effects=[Inertia()]) with densities, or use a Static step"
-        )
-    if isinstance(step, Cycles) and not analysis.linear:
-        raise InputError(
-            "fatigue steps need linear bodies, but this scene takes the nonlinear solver "
-            f"({'; '.join(why)}); leave that effect out, or run Static steps"
         )
 
 

@@ -54,13 +54,13 @@ def two_arms(
     model, upper, lower = two_bodies(
         (x_upper, x_lower), (y_upper, y_lower), z, cell=cell, order=order
     )
-    name_ends(model, upper, lower)
+    name_ends(model, upper=upper, lower=lower)
     return model, upper, lower
 
 
-def name_ends(model: Blocks, upper: Block, lower: Block) -> None:
-    """Name the end faces of two arms, and in 3-D their sides, as :func:`two_arms` says."""
-    for name, arm in (("upper", upper), ("lower", lower)):
+def name_ends(model: Blocks, **arms: Block) -> None:
+    """Name the end faces of arms, and in 3-D their sides, as :func:`two_arms` says."""
+    for name, arm in arms.items():
         model.group(f"end_{name}", arm.part(x=0.0))
         model.group(f"far_{name}", arm.part(x=float(arm.axes[0][-1])))
         if arm.dim == 3:

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import numpy.typing as npt
 from mpi4py import MPI
 
 from fxcrack.mesh import Mesh
-from fxcrack.meshes.beam import two_arms
+from fxcrack.meshes.beam import name_ends, two_arms
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.script import run
-from fxcrack.meshes.spacing import even, fine_region
+from fxcrack.meshes.spacing import even, fine_region, positive
 
 
 def dcb_2d(
@@ -128,6 +129,59 @@ def dcb_3d(
         return model
 
     return build(comm, "dcb_3d", make, out)
+
+
+def half_dcb(
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    *,
+    length: float = 100.0,
+    height: float = 1.5,
+    width: float | None = None,
+    dx: float = 0.5,
+    dy: float = 2.0,
+    ny: int = 4,
+    cell: str | None = None,
+    order: int = 1,
+    x_spacing: npt.ArrayLike | None = None,
+    out: str | Path | None = None,
+) -> Mesh:
+    """Upper arm of :func:`dcb_2d` or :func:`dcb_3d` on the plane of symmetry y = 0; collective.
+
+    Groups: those of the upper arm there: cells ``upper``; facets ``upper_face`` (y = 0),
+    ``end_upper``, ``far_upper``, ``top``, in 3-D ``side_0`` and ``side_w``; nodes ``pin_top``.
+
+    Args:
+        comm: Communicator to distribute the mesh over.
+        length: Length of the arm (length).
+        height: Its height (length).
+        width: Width of the specimen (length); ``None`` for a mesh in the plane.
+        dx: Step along the arm (length).
+        dy: Step across the width (length).
+        ny: Elements over the height.
+        cell: ``None`` for quadrilaterals or hexahedra; triangle or tetrahedron.
+        order: 1 or 2.
+        x_spacing: Coordinates of the corner nodes along the arm instead of dx, from 0 to length.
+        out: .msh file to write as well, ``None`` for none.
+
+    Raises:
+        MeshError: A length or number is not positive, or the coordinates do not fit the length.
+    """
+
+    def make() -> Blocks:
+        positive(height=height, elements=ny)
+        x = fine_region(length, dx, given=x_spacing)
+        y = np.linspace(0.0, height, int(ny) + 1)
+        z = () if width is None else (even(0.0, width, dy),)
+        model = Blocks()
+        shape = cell or ("quadrilateral" if width is None else "hexahedron")
+        upper = model.add("upper", (x, y, *z), shape, order)
+        model.group("upper_face", upper.part(y=0.0))
+        model.group("top", upper.part(y=height))
+        name_ends(model, upper=upper)
+        model.group("pin_top", upper.part(x=0.0, y=height))
+        return model
+
+    return build(comm, "half_dcb", make, out)
 
 
 if __name__ == "__main__":

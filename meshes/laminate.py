@@ -161,7 +161,7 @@ def _two_stacks(
         (x, x), (lines(above), lines(below)), z,
         cell=cell, order=order, layers=(names[above], names[below]),
     )  # fmt: skip
-    name_ends(model, upper, lower)
+    name_ends(model, upper=upper, lower=lower)
     model.group("pin_top", upper.part(x=0.0, y=float(ends[-1])))
     model.group("pin_bottom", lower.part(x=0.0, y=float(ends[0])))
     return model

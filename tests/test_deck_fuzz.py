@@ -14,6 +14,7 @@ from fxcrack.deck.deck import translated
 from tests.decks import BONDED, OPENED, PLATE, STEP, VCCT
 from tests.test_deck_distributing import BLOCK
 from tests.test_deck_explicit import DECK as EXPLICIT
+from tests.test_deck_joined_pairs import two
 from tests.test_deck_mesh import GENERATED, PARTS
 from tests.test_deck_surface_shells import ARMS as SHELLS
 
@@ -30,6 +31,7 @@ BASE = [
     "*DLOAD\nLAST, P3, 1.\n*TEMPERATURE\nALL, 30.\n*END STEP\n",
     EXPLICIT,
     SHELLS,
+    two(),
     BLOCK.format(nlgeom="", load="*CLOAD\nREF, 3, 1.\nREF, 4, 1."),
 ]
 WORDS = st.sampled_from(

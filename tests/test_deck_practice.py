@@ -269,3 +269,11 @@ def test_rows_by_number():
     assert np.array_equal(table.rows, [wanted[k] for k in sorted(wanted)])
     assert table.find(np.array([0, table.labels[3]])).tolist() == [-1, 3]
     assert np.array_equal(table.copy().rows, table.rows)
+
+
+def test_fixed_increments_that_miss_the_onset_say_what_helps(tmp_path, caplog):
+    step = OPENED.replace("*STATIC\n0.1, 1.", "*STATIC, DIRECT\n1., 1.")
+    deck = fx.read_deck(write(tmp_path, bonded(VCCT, step=step)))
+    assert deck.run().reason.startswith("stopped")
+    assert "third field of the procedure's data line, which DIRECT takes away" in caplog.text
+    deck.scene.close()

@@ -469,7 +469,7 @@ def test_dynamic_steps(tmp_path):
         ("*BOUNDRY\nLEFT, 1\n", r"did you mean \*BOUNDARY"),
         ("*BOUNDARY, AMPLITUD=A\nLEFT, 1\n", "there is no amplitude 'A'"),
         ("*BOUNDARY, WEIGHT=A\nLEFT, 1\n", "the parameter WEIGHT is not available"),
-        ("*INITIAL CONDITIONS, TYPE=STRESS\nALL, 1.\n", "TYPE=STRESS is not available"),
+        ("*INITIAL CONDITIONS, TYPE=FIELD\nALL, 1.\n", "TYPE=FIELD is not available"),
     ],
 )
 def test_steps_and_cards_that_are_refused(tmp_path, text, words):

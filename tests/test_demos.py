@@ -19,14 +19,17 @@ from fxcrack.demos import (
     effects_cost,
     enf,
     enhanced_dcb,
+    fatigue_front,
     friction_enf,
     front3d,
+    half_dcb,
     large_dcb,
     mmb,
     moment_dcb,
     penny,
     pinch,
     shell_dcb,
+    skin_stringer,
     skin_stringer_panel,
     thermal_bilayer,
     two_cracks,
@@ -46,6 +49,16 @@ def test_dcb_is_close_to_beam_theory():
     # plane strain is 0.35 % above the theory, the coarse mesh another 0.6 %
     assert all(row[2] == pytest.approx(row[4], rel=0.012) for row in rows)
     assert scene.solver.timings.factorizations == 1
+    assert balanced(scene.history)
+
+
+@pytest.mark.slow
+def test_half_of_a_dcb_costs_half() -> None:
+    (scene, half), (_, whole) = (half_dcb.run(h, dx=2.5, until=32.5) for h in (True, False))
+    for name, part in {"load": 1.0, "G": 1.0, "released": 0.5, "unknowns": 0.5}.items():
+        assert half[name] == pytest.approx(
+            part * whole[name], rel=1e-9
+        )  # the same but for rounding
     assert balanced(scene.history)
 
 
@@ -118,6 +131,32 @@ def test_shell_dcb_is_close_to_the_solids_with_long_cells():
 
 
 @pytest.mark.slow
+def test_skin_stringer_counts_only_what_lies_under_the_foot():
+    """Whole skin as slave, or the foot: one crack, whose G is the change of strain energy."""
+    found = [
+        skin_stringer.check(2.0, 10.0, 4.0, slave, order=1)
+        for slave in ("skin_outside", "foot_bottom")
+    ]
+    for one in found:
+        assert one["area"] == pytest.approx(160.0) and one["tips"] == 5.0
+        # VCCT on elements half as long as the debond; the difference spans four of them
+        assert one["VCCT"] == pytest.approx(one["-dU/dA"], rel=0.05)
+    assert found[0]["VCCT"] == pytest.approx(found[1]["VCCT"], rel=1e-9)
+
+
+@pytest.mark.slow
+def test_skin_stringer_grows_under_the_foot():
+    scene = skin_stringer.run(dx=2.0, dz=4.0, releases=60)
+    history = scene.history
+    assert balanced(history)
+    grown = float(history["area[bond]"][-1] - history["area[bond]"][0])
+    assert 50.0 < grown < 400.0
+    released = scene.pairs[0].surface.x[[node for node, _ in scene.cracks[0].released]]
+    assert np.all(np.abs(released[:, 0]) <= skin_stringer.FOOT + 1e-9)
+    scene.close()
+
+
+@pytest.mark.slow
 def test_skin_stringer_panel_buckles_and_comes_off():
     """Flat, it has the stiffness of its laminates; then it buckles, and the debond grows."""
     demo = skin_stringer_panel
@@ -160,6 +199,17 @@ def test_two_cracks_grow_in_turn():
     released = [g.n_released for g in scene.cracks]
     assert min(released) > 0
     assert balanced(scene.history)
+
+
+@pytest.mark.slow
+def test_fatigue_front_bows_out_in_part_and_arrests_by_node():
+    smooth = fatigue_front.run(True, dy=2.0, lengths=(11.0, 12.0))
+    np.testing.assert_allclose(smooth.x[-1], smooth.x[-1][::-1], atol=1e-5)
+    assert 0.4 < np.ptp(smooth.x[-1]) < 1.2  # as the front of static growth has it
+    assert balanced(smooth.history)
+    jumping = fatigue_front.run(False, dy=1.0, lengths=(11.0, 12.0))
+    assert jumping.history.reason.startswith("arrest")
+    assert float(jumping.history.rows[-1]["N"]) > float(smooth.history.rows[-1]["N"])
 
 
 def test_moment_dcb_is_straight():

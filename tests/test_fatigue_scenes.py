@@ -12,6 +12,7 @@ from specimens import (
     CLAMPED_3D,
     GROWS,
     HALF_OPENING,
+    PARIS,
     STEEL,
     bond,
     column,
@@ -122,7 +123,9 @@ def test_loads_out_of_step_with_contact_equal_their_sampled_cycle(comm):
 # --- several interfaces, steps in turn ------------------------------------------------------------
 
 
-def stacked(comm: Any, debonds: list[tuple[float, Any]]) -> tuple[fx.Scene, list[fx.Interface]]:
+def stacked(
+    comm: Any, debonds: list[tuple[float, Any]], **options: Any
+) -> tuple[fx.Scene, list[fx.Interface]]:
     """Two bench specimens far from each other, with initial length and criterion of each."""
 
     def make() -> Blocks:
@@ -155,6 +158,7 @@ def stacked(comm: Any, debonds: list[tuple[float, Any]]) -> tuple[fx.Scene, list
             for name, sign in (("top", 1.0), ("bottom", -1.0))
         ],
         debonds=[fx.Debond(f, c) for f, (_, c) in zip(interfaces, debonds, strict=True)],
+        **options,
     )
     return scene, interfaces
 
@@ -211,6 +215,12 @@ def test_static_growth_cycles_and_static_growth_in_turn(comm):
     scene.run(fx.Cycles(maximum=before["time"], ratio=0.1, n_max=2000.0), grow=[tired])
     after = scene.history.rows[-1]
     assert after["released[bond1]"] > 0
+    # by hand: the law at onset, then its integral over each element, log-linear in a
+    rows = [r for r in scene.history if r["event"] in GROWS and "dG[bond1]" in r]
+    dG, N = column(rows, "dG[bond1]"), column(rows, "N")
+    slow = 1.0 / PARIS.growth_rate(dG)
+    each = np.diff(slow) / np.diff(np.log(slow))
+    np.testing.assert_allclose(N[1:], PARIS.onset_cycles(dG[0]) + np.cumsum(each), rtol=1e-9)
     assert after["released_energy"] > before["released_energy"]
     assert after["external_work"] == pytest.approx(before["external_work"])  # displacements held
     history = scene.run(fx.Static(until=fx.CrackLength(one, 35.0)), grow=[brittle])

@@ -16,7 +16,7 @@ from specimens import tensor_surface
 import fxcrack as fx
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.continuum import Continuum
-from fxcrack.interface.pairing import local_frames
+from fxcrack.interface.frames import local_frames
 from fxcrack.interface.surface import gather_surface
 from fxcrack.mesh import Mesh
 from fxcrack.meshes.blocks import Blocks, build

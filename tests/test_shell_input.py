@@ -222,12 +222,6 @@ FAULTS: dict[str, tuple[Callable[[MPI.Intracomm], Any], str]] = {
         lambda c: scene(plate(c), effects=[fx.Inertia(density=1.0, rayleigh=(0.0, 1.0))]),
         "damping by stiffness is not available",
     ),
-    "explicit dynamics": (
-        lambda c: scene(plate(c), effects=[fx.Inertia(density=1.0)]).run(
-            fx.Explicit(until=fx.Time(1.0)), progress=False
-        ),
-        "no lumped masses",
-    ),
     "pressure that follows": (
         lambda c: scene(plate(c), loads=[fx.Pressure(fx.Face("plate", "top"), 1.0, follows=True)]),
         "keeps its direction",

@@ -129,6 +129,16 @@ CALLS: list[Call] = [
             "normal_only": False, "tolerance": 0.1, "gap": "keep", "strict": False, "name": "n",
         },
     ),
+    (fx.RigidPlane, {"point": (0.0, 1.0), "normal": (0.0, 1.0)}),
+    (
+        fx.RigidCylinder,
+        {"point": (0.0, 1.0), "axis": (0.0, 0.0, 1.0), "radius": 1.0, "inside": False},
+    ),
+    (fx.RigidSphere, {"point": (0.0, 1.0, 2.0), "radius": 1.0, "inside": True}),
+    (
+        fx.Interface,
+        {"slave": "a", "master": fx.RigidPlane((0.0, 1.0), (0.0, 1.0)), "symmetry": True},
+    ),
     (
         fx.Debond,
         {

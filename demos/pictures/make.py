@@ -43,6 +43,7 @@ FIGURES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "pinch": ("pinch", "pinch.png", ()),
     "shell_accuracy": ("shell_accuracy", "shell_accuracy.png", ()),
     "shell_dcb": ("shell_dcb", "shell_dcb.png", ()),
+    "skin_stringer": ("skin_stringer", "skin_stringer.png", ()),
     "skin_stringer_panel": ("skin_stringer_panel", "skin_stringer_panel.png", ()),
 }
 

@@ -179,7 +179,10 @@ def choose_roles(
             margin = 2.0 * front.surface.facet_size
             if behind > 0.0:
                 wake |= distance <= behind + margin
-            role[wake & is_open] = RETAINED
+            wake &= is_open
+            role[wake, 0] = RETAINED
+            if not pair.interface.mode_i_only:
+                role[wake] = RETAINED
             near = _rings(front, tips, 2 * front.surface.order) & bonded
             if ahead > 0.0:
                 near |= bonded & (distance <= ahead + margin)

@@ -1,4 +1,4 @@
-"""Whether the supports hold the bodies against moving as one rigid whole.
+"""Whether the supports, and rigid surfaces, hold the bodies against moving as one rigid whole.
 
 The rigid motions of the model, restricted to the supported displacement components, must be
 linearly independent: their smallest singular value must not vanish. The check needs no
@@ -8,6 +8,8 @@ supports and bonds, is answered by :mod:`fxcrack.condensation.free_bodies`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
@@ -15,6 +17,7 @@ from fxcrack.base.errors import SolverError
 from fxcrack.condensation.mumps_schur import mumps_message
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 
 _UNSEEN = 1e-8
@@ -73,14 +76,47 @@ def held_dofs(continuum: Continuum, supports: Supports) -> Ints:
     return np.flatnonzero(held)
 
 
-def check_held(continuum: Continuum, supports: Supports) -> None:
+def _at_rigid(continuum: Continuum, pair: Pair, motions: Array) -> Array:
+    """Motions of this rank's nodes that a rigid surface holds or may hold, across it or in all.
+
+    Args:
+        continuum: The bodies.
+        pair: An interface with a rigid master.
+        motions: Rigid motions, shape (n_local, n_motions).
+
+    Returns:
+        Shape (n, n_motions).
+    """
+    layout, gdim = continuum.layout, continuum.gdim
+    dofs = pair.surface.dofs
+    touches = pair.bonded | pair.interface.contact
+    mine = np.flatnonzero(layout.is_owned(dofs) & pair.paired & touches)
+    local = layout.to_local(dofs[mine])
+    moved = motions[layout.dof(local[:, None], np.arange(gdim))]
+    if pair.surface.point_maps is not None:
+        maps = pair.surface.point_maps[mine]
+        moved = np.einsum("ncj,njm->ncm", maps, motions[layout.dofs(local)])
+    moved = np.einsum("nci,ncm->nim", pair.frames[mine], moved)
+    holds = np.ones((len(mine), gdim), dtype=bool)
+    holds[:, 1:] = (pair.bonded[mine] & (not pair.interface.normal_only))[:, None]
+    return np.asarray(moved[holds])
+
+
+def check_held(continuum: Continuum, supports: Supports, pairs: Sequence[Pair] = ()) -> None:
     """Refuse a model that can move as a whole; collective.
+
+    Args:
+        continuum: The bodies.
+        supports: Prescribed components.
+        pairs: Interfaces; those with a rigid master hold the bodies as well.
 
     Raises:
         SolverError: It can.
     """
     motions = rigid_motions(continuum)
     held = motions[held_dofs(continuum, supports)]
+    rigid = [_at_rigid(continuum, pair, motions) for pair in pairs if pair.rigid is not None]
+    held = np.concatenate([held, *rigid])
     if supports.following is not None:
         held = np.concatenate([held, supports.following.residual(continuum.layout, motions)])
     triangles = continuum.comm.allgather(np.linalg.qr(held, mode="r"))

@@ -250,8 +250,10 @@ class InertiaForces(Term):
 
     def _damping(self, velocity: Any, v: Any) -> Any:
         c = self._continuum
-        ev, e = c.model.strain(v, c.x), c.model.strain(velocity, c.x)
         total = self._by_mass * self._mass(velocity, v)
+        if not self._effect.rayleigh[1]:
+            return total  # of shells there is no other
+        ev, e = c.model.strain(v, c.x), c.model.strain(velocity, c.x)
         for stiffness, _, dx in c.parts:
             total += self._by_stiffness * ufl.inner(ufl.dot(stiffness, e), ev) * c.weight * dx
         return total

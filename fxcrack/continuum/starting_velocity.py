@@ -19,6 +19,8 @@ _INSIDE = 1e-9
 def starting_velocity(continuum: Continuum, velocity: Sequence[Any] | None) -> Array:
     """Velocity of the owned dofs, shape (n_local,), length/time.
 
+    Directors of shells do not turn at first.
+
     Args:
         continuum: Displacement space; first order.
         velocity: A number or a function of position per component; ``None`` for bodies at rest.
@@ -28,7 +30,7 @@ def starting_velocity(continuum: Continuum, velocity: Sequence[Any] | None) -> A
             gives other than one number per position.
     """
     gdim = continuum.gdim
-    out = np.zeros((continuum.layout.n_owned, gdim))
+    out = np.zeros((continuum.layout.n_owned, continuum.layout.n_unknowns))
     if velocity is None:
         return out.ravel()
     if len(velocity) != gdim:

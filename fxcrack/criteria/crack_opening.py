@@ -210,7 +210,8 @@ class OpeningEvaluator(Evaluator):
             normal[:] = tips.frame[:, None, :, 0]
         else:
             normal[..., : self.probe.gdim] = pair.frames[stencil.nodes, :, 0]
-        opening = np.einsum("nkc,nkc->nk", normal, jump) + pair.gap[stencil.nodes]
+        gap = pair.interface.opening_factor * pair.gap
+        opening = np.einsum("nkc,nkc->nk", normal, jump) + gap[stencil.nodes]
         return np.stack([stencil(opening), self._grown[tips.node]], axis=1)
 
     def value(self, tips: Tips, measured: Array) -> tuple[Array, dict[str, Array]]:

@@ -61,13 +61,14 @@ class NextFront:
     shift: Array
 
     @classmethod
-    def of(cls, front: Front, tips: Tips, *, simplices: bool) -> NextFront | None:
+    def of(cls, front: Front, tips: Tips, *, simplices: bool, order: int) -> NextFront | None:
         """The next front; ``None`` where the crack ends.
 
         Args:
             front: The present front, the bodies undeformed.
             tips: Its nodes.
             simplices: Whether the cells are triangles or tetrahedra.
+            order: Order of their displacement.
         """
         moves = (tips.d_ahead > 0.0) & ~tips.ligament
         opened = np.unique(tips.force_nodes[moves])
@@ -86,7 +87,7 @@ class NextFront:
         return cls(
             after, later, opened, np.where(near, match, -1),
             0.5 * (tips.d_ahead + tips.d_behind), 0.5 * (later.d_ahead + later.d_behind)[match],
-            tips.d_ahead, np.array(_SHIFT[simplices, surface.order]),
+            tips.d_ahead, np.array(_SHIFT[simplices, order]),
         )  # fmt: skip
 
     def weight(self, tip: int, shares: Array) -> float:
@@ -100,13 +101,16 @@ class NextFront:
         here, there = c * self.here[tip], c * self.there[tip]
         return float(here / (self.step[tip] - there + here))
 
-    def to_open(self, tips: Tips, force: Array, probe: FrontProbe) -> tuple[Ints, Bools, Array]:
+    def to_open(
+        self, tips: Tips, force: Array, probe: FrontProbe, state: State
+    ) -> tuple[Ints, Bools, Array]:
         """What is released on the way to this front.
 
         Args:
             tips: The present front.
             force: Bond forces at its force nodes in the tip frames, shape (n_tips, k, 3) [force].
             probe: The interface.
+            state: State of the solver.
 
         Returns:
             Slave nodes, shape (n,); whether their faces stay closed, since contact presses them
@@ -117,7 +121,15 @@ class NextFront:
         if probe.pair.interface.contact:
             pressed[:] = force[:, :, 0].sum(axis=1, keepdims=True) <= 0.0
         nodes, first = np.unique(tips.force_nodes, return_index=True)
-        return nodes, pressed.reshape(-1)[first], vectors.reshape(-1, 3)[first]
+        closed, pulls = pressed.reshape(-1)[first], vectors.reshape(-1, 3)[first]
+        hierarchy = probe.pair.hierarchy
+        if hierarchy is not None:
+            # midside nodes have no tip of their own: they come free with the last corner beside
+            midsides = hierarchy.opened_by(probe.front.bonded, nodes)
+            nodes = np.append(nodes, midsides)
+            closed = np.append(closed, np.zeros(len(midsides), dtype=bool))
+            pulls = np.concatenate([pulls, probe.bond_forces(midsides, state)])
+        return nodes, closed, pulls
 
     def to_come(self, tips: Tips, probe: FrontProbe, state: State) -> Array:
         """Traction that the loads behind the tips will have on the facets about to open.

@@ -158,6 +158,8 @@ class FrontProbe(Protocol):
     def jumps(self, nodes: Ints, state: State) -> Array:
         """Displacement of slave nodes less that of the master surface at their place.
 
+        On a plane of symmetry that of both halves, twice the displacement of the node.
+
         Returns:
             Global vectors, shape (..., 3) [length]; an opening is positive along the normal, which
             points from master to slave.

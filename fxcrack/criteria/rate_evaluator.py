@@ -309,7 +309,8 @@ class RateEvaluator(SofteningEvaluator):
             unit = np.intersect1d(tips.force_nodes[rows], left)
             left = np.setdiff1d(left, unit)
             area = front.swept(int(tips.node[first]), unit)
-            energy = float(critical[k] * area)
+            # on a plane of symmetry the other half dissipates as much
+            energy = float(critical[k] * area) / self.probe.pair.interface.opening_factor
             every = self.probe.pair.opened_with(bonded, unit)
             bonded[every] = False
             out.append(CohesiveUnit(every, energy, bool(rates[k, 0] <= 0.0), area))

@@ -11,6 +11,7 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
 from fxcrack.base.positions import numbers_at
+from fxcrack.continuum.face import Face
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.continuum.loads import BodyForce
 from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt_strain
@@ -53,7 +54,9 @@ class RingBuilder:
         self._cells = self._bodies.cells_around(groups)
         self._on_faces = loads_on_faces(continuum, self._loads)
         self._slaves = probe.pair.surface.dofs
-        self._masters = gather_surface(continuum, probe.pair.sides[1]).dofs
+        master = probe.pair.sides[1]
+        assert isinstance(master, str | Face)  # rigid surfaces are refused before
+        self._masters = gather_surface(continuum, master).dofs
         self._ring = isinstance(continuum.model, Axisymmetric)
         self._thickness = float(getattr(continuum.model, "thickness", 1.0))
         self._n_modes = 2 if probe.gdim == 2 else 3

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -12,13 +11,8 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Ints
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import (
-    AmplitudeRelease,
     Criterion,
-    EnhancedVCCT,
-    Fatigue,
     RampRelease,
-    ReleaseLaw,
-    StepRelease,
 )
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.deck.cards import Card, Row, key, label
@@ -28,7 +22,10 @@ from fxcrack.deck.fracture import NodalRates, read_criterion
 from fxcrack.deck.general_contact import GeneralContact
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.interactions import friction, interaction, note_thickness
+from fxcrack.deck.joined_pairs import join_pairs, joined_criterion
 from fxcrack.deck.model import Family
+from fxcrack.deck.pair_def import PairDef, slave_nodes
+from fxcrack.deck.release import check_alike, read_release
 from fxcrack.deck.report import Report
 from fxcrack.deck.supports import Boundary
 from fxcrack.interface.definition import Interface
@@ -38,31 +35,6 @@ _RAMP = 5
 """Increments over which a ramp falls that cannot fall with the opening."""
 _COINCIDENT = 1e-6
 """Distance of nodes at one place, over the size of the facets."""
-
-
-@dataclass(eq=False)
-class PairDef:
-    """A contact pair of the deck.
-
-    Attributes:
-        row: Its data line.
-        slave: Name of the slave surface.
-        master: Name of the master surface.
-        title: Name of the interface: that of its slave, with its master where that is not enough.
-        bonded: Line of the initial conditions that bonds it, None: not bonded.
-        normal_only: Whether the bond holds in the normal direction only.
-        debonds: Its ``*DEBOND`` and ``*FRACTURE CRITERION`` cards, with the number of their step.
-        interface: What is made of it.
-    """
-
-    row: Row
-    slave: str
-    master: str
-    title: str
-    bonded: Row | None = None
-    normal_only: bool = False
-    debonds: list[tuple[int, Card, Card]] = field(default_factory=list)
-    interface: Interface | None = None
 
 
 class Contacts:
@@ -105,6 +77,8 @@ class Contacts:
             if card.keyword == "INITIALCONDITIONS" and card.word("TYPE") == "CONTACT":
                 for row in card.need_rows("slave surface, master surface, bonded node set"):
                     self._bond(row, card.has("NORMAL"))
+        if not explicit:
+            self.pairs = join_pairs(self.pairs, flat, report)
         self._ties = [card for card in cards if card.keyword == "TIE"]
         nodal = [card for card in cards if card.keyword == "NODALENERGYRATE"]
         self._nodal = NodalRates(nodal, flat) if nodal else None
@@ -149,7 +123,7 @@ class Contacts:
         name = label(row.text(2))
         if len(chosen) > 1 and name:
             marked = self._flat.nodes(row.card, name, row.index)
-            chosen = [p for p in chosen if np.isin(self._slave_nodes(p), marked).any()]
+            chosen = [p for p in chosen if np.isin(slave_nodes(p, self._flat), marked).any()]
         for pair in chosen:
             if pair.bonded is not None:
                 row.fail(f"the pair '{pair.title}' is bonded already")
@@ -163,11 +137,8 @@ class Contacts:
 
     def slave_nodes(self) -> dict[str, Ints]:
         """Nodes of the slave surfaces by the titles of the interfaces."""
-        found = {pair.title: self._slave_nodes(pair) for pair in self.pairs if pair.debonds}
+        found = {pair.title: slave_nodes(pair, self._flat) for pair in self.pairs if pair.debonds}
         return found | self._general.slave_nodes
-
-    def _slave_nodes(self, pair: PairDef) -> Ints:
-        return np.unique(self._flat.surface(pair.row.card, pair.slave, pair.row.index))
 
     # -- debonds of the steps ------------------------------------------------------------
 
@@ -200,22 +171,28 @@ class Contacts:
                 card.fail("*FRACTURE CRITERION must stand directly after it")
             slave, master = card.text("SLAVE", "SECONDARY"), card.text("MASTER", "MAIN")
             found = [
-                p for p in self.pairs if key(p.slave) == key(slave) and key(p.master) == key(master)
+                (p, whole)
+                for whole in self.pairs
+                for p in whole.parts or [whole]
+                if key(p.slave) == key(slave) and key(p.master) == key(master)
             ]
             if not found:
                 card.fail(
                     f"there is no contact pair of '{slave}' and '{master}'; define it by *CONTACT "
                     "PAIR"
                 )
-            if found[0].bonded is None:
+            pair, whole = found[0]
+            if pair.bonded is None:
                 card.fail(
                     f"the pair of '{slave}' and '{master}' is not bonded; bond it by *INITIAL "
                     "CONDITIONS, TYPE=CONTACT"
                 )
-            if any(n == number for n, _, _ in found[0].debonds):
+            if any(n == number for n, _, _ in pair.debonds):
                 card.fail("the pair has a criterion in this step already; one is possible")
-            found[0].debonds.append((number, card, cards[i + 1]))
-            grow[found[0].title] = max(int(card.number("FREQUENCY", 1.0)), 0)
+            pair.debonds.append((number, card, cards[i + 1]))
+            if whole is not pair:
+                whole.debonds.append((number, card, cards[i + 1]))
+            grow[whole.title] = max(int(card.number("FREQUENCY", 1.0)), 0)
         return grow
 
     # -- supports of bonded nodes --------------------------------------------------------
@@ -232,7 +209,7 @@ class Contacts:
             card = pair.row.card
             if pair.bonded is None and not card.has("TIED"):
                 continue
-            slave = self._slave_nodes(pair)
+            slave = slave_nodes(pair, self._flat)
             name = "" if pair.bonded is None else label(pair.bonded.text(2))
             if name and pair.bonded is not None:
                 bonded = self._flat.nodes(pair.bonded.card, name, pair.bonded.index)
@@ -287,7 +264,7 @@ class Contacts:
                 continue
             rubs = any(self._friction(p, interactions) is not None for p in self.pairs)
             debonds.append(self._debond(pair, rubs=rubs))
-            held = np.intersect1d(self._slave_nodes(pair), supported)
+            held = np.intersect1d(slave_nodes(pair, self._flat), supported)
             if len(held):
                 log.warn(
                     "%s: supports hold %d nodes of the crack surface '%s'",
@@ -370,7 +347,8 @@ class Contacts:
         """Whether a clearance that is nothing beside the elements is given for a pair."""
         for card in self._clearances:
             names = key(card.text("SLAVE", "SECONDARY")), key(card.text("MASTER", "MAIN"))
-            if names != (key(pair.slave), key(pair.master)):
+            known = [(key(p.slave), key(p.master)) for p in [pair, *pair.parts]]
+            if names not in known:
                 continue
             value = card.number("VALUE", 0.0)
             if not card.has("VALUE") or card.lines:
@@ -402,22 +380,9 @@ class Contacts:
     def _debond(self, pair: PairDef, *, rubs: bool) -> Debond:
         assert pair.interface is not None
         _, card, criterion_card = pair.debonds[0]
-        for _, other, of_other in pair.debonds[1:]:
-            if of_other.options != criterion_card.options or of_other.lines != criterion_card.lines:
-                of_other.fail(
-                    f"the pair has another criterion before ({criterion_card.place}); a pair has "
-                    "one criterion in all steps"
-                )
-            if _release_words(other) != _release_words(card):
-                other.fail("the bond force falls in another way than in the step before")
-        criterion = read_criterion(
-            criterion_card,
-            self._flat,
-            self._groups,
-            self._nodal,
-            self._slave_nodes(pair),
-            finite=self._finite,
-        )
+        if not pair.parts:
+            check_alike(pair)
+        criterion = self._criterion(pair)
         if self._flat.kind.gdim == 3 and not isinstance(criterion, RateCriterion):
             self._report.replace(
                 "this criterion is for 2-D in other programs; it is used on the 3-D front",
@@ -425,7 +390,7 @@ class Contacts:
             )
         if pair.normal_only and isinstance(criterion, RateCriterion):
             criterion_card.fail("a bond in the NORMAL direction only is not possible with it")
-        release = _release(card, criterion)
+        release = read_release(card, criterion)
         if rubs and isinstance(release, RampRelease):
             release = RampRelease(increments=_RAMP)
             self._report.replace(
@@ -436,6 +401,19 @@ class Contacts:
             return Debond(pair.interface, criterion, release)
         except InputError as error:
             criterion_card.fail(str(error))
+
+    def _criterion(self, pair: PairDef) -> Criterion:
+        """The criterion of a pair; of joined ones that of all of them."""
+        if pair.parts:
+            return joined_criterion(pair, self._flat, self._criterion)
+        return read_criterion(
+            pair.debonds[0][2],
+            self._flat,
+            self._groups,
+            self._nodal,
+            slave_nodes(pair, self._flat),
+            finite=self._finite,
+        )
 
     def _tie(self, row: Row) -> Interface:
         card, groups = row.card, self._groups
@@ -458,36 +436,3 @@ def _pairing(card: Card) -> str | None:
     """How nodes follow the master where the deck says so."""
     kinds = {"NODETOSURFACE": "node-to-surface", "SURFACETOSURFACE": "surface-to-surface"}
     return kinds[card.word("TYPE")] if card.has("TYPE") else None
-
-
-def _release_words(card: Card) -> tuple[object, ...]:
-    words = {k: v for k, v in card.options.items() if k not in ("FREQUENCY", "OUTPUT")}
-    return tuple(sorted(words.items(), key=str)), tuple(card.lines)
-
-
-def _release(card: Card, criterion: Criterion) -> ReleaseLaw:
-    """How the bond force goes to zero."""
-    force = card.choose("DEBONDING FORCE", ("STEP", "RAMP"), "STEP")
-    numbers = [x for row in card.rows() for x in row.numbers()]
-    if isinstance(criterion, RateCriterion):
-        if numbers:
-            card.fail(
-                "a debonding amplitude belongs to critical stress, COD and crack length; with "
-                "energy release rates give DEBONDING FORCE=STEP or RAMP"
-            )
-        if isinstance(criterion, Fatigue | EnhancedVCCT) or force == "STEP":
-            if force == "RAMP" and isinstance(criterion, Fatigue):
-                card.fail("in cycles bonds are released at once; give DEBONDING FORCE=STEP")
-            return StepRelease()
-        return RampRelease()
-    if card.has("DEBONDING FORCE"):
-        card.fail("DEBONDING FORCE belongs to energy release rates; give an amplitude instead")
-    if not numbers:
-        return StepRelease()
-    if len(numbers) % 2:
-        card.fail("the amplitude's numbers are no pairs of relative time and relative force")
-    first = card.number("TIME INCREMENT", 0.0) or None
-    try:
-        return AmplitudeRelease(numbers[::2], numbers[1::2], first)
-    except InputError as error:
-        card.fail(str(error))

@@ -100,11 +100,17 @@ def _help(reason: str, step: DeckStep) -> str:
     if reached:
         value = max(1.1 * (float(reached[1]) - 1.0), 1e-3)
         least = f"; f = {reached[1]} asks for UNSTABLE GROWTH TOLERANCE={value:.2g} at least"
-    return (
+    smaller = ""
+    if "below the minimum" in reason:
+        smaller = (
+            "a smaller least increment (third field of the procedure's data line, which DIRECT "
+            "takes away) or a smaller first one meets the onset; "
+        )
+    return smaller + (
         "UNSTABLE GROWTH TOLERANCE of *FRACTURE CRITERION (without a value it has no limit"
-        f"{least}) or a larger TOLERANCE lets several nodes debond in one increment, *CONTROLS, "
-        "PARAMETERS=TIME INCREMENTATION (eighth field, I_A) allows more cutbacks, and INC of *STEP "
-        "more increments"
+        f"{least}; it counts once a node has debonded) or a larger TOLERANCE lets several nodes "
+        "debond in one increment, *CONTROLS, PARAMETERS=TIME INCREMENTATION (eighth field, I_A) "
+        "allows more cutbacks, and INC of *STEP more increments"
     )
 
 

@@ -139,7 +139,9 @@ def read_procedures(steps: Sequence[Family], report: Report) -> list[Procedure]:
         if out and isinstance(out[-1].step, Cycles) and not isinstance(step, Cycles):
             found[0].fail("after a step of cycles only further steps of cycles are available")
         if isinstance(step, Cycles) and finite:
-            family.card.fail("cycles need NLGEOM=NO: their bodies are linear")
+            family.card.fail(
+                "cycles need NLGEOM=NO in a deck; at finite strain run them from Python, fx.Cycles"
+            )
         if out and isinstance(step, Explicit) != isinstance(out[0].step, Explicit):
             found[0].fail(
                 "explicit steps and others in one deck are not available; compute them as two decks"

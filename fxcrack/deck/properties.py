@@ -18,6 +18,7 @@ from fxcrack.deck.cards import Card, DeckError, Row, key
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.generators import axis_rotation
 from fxcrack.deck.groups import Groups
+from fxcrack.deck.initial_stress import InitialStress, Stress
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
 from fxcrack.deck.shells import cell_normals, is_isotropic, section_axis, surface_section
@@ -47,26 +48,33 @@ class Sections:
     rayleigh: tuple[float, float]
 
 
-def read_sections(flat: Flat, groups: Groups, report: Report) -> Sections:
+def read_sections(flat: Flat, groups: Groups, report: Report, stresses: InitialStress) -> Sections:
     """Materials of all cells.
+
+    Args:
+        flat: The model.
+        groups: Takes the cells of each section.
+        report: Takes what is replaced.
+        stresses: Initial stress of the cells.
 
     Raises:
         DeckError: A cell has no section or two different ones, or a section or material is not
             available.
     """
-    return _Sections(flat, groups, report).read()
+    return _Sections(flat, groups, report, stresses).read()
 
 
 class _Sections:
-    def __init__(self, flat: Flat, groups: Groups, report: Report) -> None:
+    def __init__(self, flat: Flat, groups: Groups, report: Report, stresses: InitialStress) -> None:
         self._flat, self._groups, self._report = flat, groups, report
+        self._stresses = stresses
         self._materials = flat.model.materials
         self._zeros: set[float] = set()
 
     def read(self) -> Sections:
         flat = self._flat
         owner = np.full(len(flat.cells), -1, dtype=np.int64)
-        kinds: list[tuple[str | Card, Frame, float]] = []
+        kinds: list[tuple[str | Card, Frame, float, Stress]] = []
         cards: list[tuple[Card, str]] = []
         titles: list[list[str]] = []
         spaces: list[Space] = []
@@ -75,35 +83,35 @@ class _Sections:
                 cells = flat.in_space(place, card, card.text("ELSET"))
                 self._check_elements(card, cells, placed.space)
                 is_shell = card.keyword == "SHELLSECTION"
-                kind = (
-                    card if is_shell else self._known(card),
-                    self._frame(card, placed.space),
-                    1.0 if is_shell else self._thickness(card),
-                )
+                what = card if is_shell else self._known(card)
+                frame = self._frame(card, placed.space)
+                thickness = 1.0 if is_shell else self._thickness(card)
                 title = (f"{placed.space.name}." if place else "") + card.text("ELSET")
-                if kind not in kinds:
-                    kinds.append(kind)
-                    spaces.append(placed.space)
-                    cards.append((card, title))
-                    titles.append([])
-                i = kinds.index(kind)
-                titles[i].append(title)
-                both = cells[(owner[cells] >= 0) & (owner[cells] != i)]
-                if len(both):
-                    first = cards[int(owner[both[0]])][0]
-                    card.fail(
-                        f"{len(both)} elements of '{card.text('ELSET')}' have another section "
-                        f"already ({first.place}); give every element one"
-                    )
-                owner[cells] = i
+                for stress, part in self._stresses.parts(cells):
+                    kind = what, frame, thickness, stress
+                    if kind not in kinds:
+                        kinds.append(kind)
+                        spaces.append(placed.space)
+                        cards.append((card, title))
+                        titles.append([])
+                    i = kinds.index(kind)
+                    titles[i].append(title)
+                    both = part[(owner[part] >= 0) & (owner[part] != i)]
+                    if len(both):
+                        first = cards[int(owner[both[0]])][0]
+                        card.fail(
+                            f"{len(both)} elements of '{card.text('ELSET')}' have another section "
+                            f"already ({first.place}); give every element one"
+                        )
+                    owner[part] = i
         lost: Ints = np.flatnonzero(owner < 0).astype(np.int64)
         if len(lost):
             self._fail_lost(lost)
         used = sorted(set(owner.tolist()))
-        thickness = {kinds[i][2] for i in used}
-        if len(thickness) > 1:
+        all_of = {kinds[i][2] for i in used}
+        if len(all_of) > 1:
             cards[used[1]][0].fail(
-                f"the sections have different thicknesses ({', '.join(map(str, thickness))}); a "
+                f"the sections have different thicknesses ({', '.join(map(str, all_of))}); a "
                 "plane model has one"
             )
         damping = {pair for i in used for pair in self._damping(kinds[i][0])}
@@ -116,18 +124,19 @@ class _Sections:
         for i in used:
             name = self._groups.cells(cards[i][1], np.flatnonzero(owner == i), words="elements")
             sets[name] = titles[i]
-            what, frame, _ = kinds[i]
+            what, frame, _, stress = kinds[i]
             if isinstance(what, Card) and flat.kind.shell:
                 cells = np.flatnonzero(owner == i)
                 materials[name] = self._surface_section(what, cells, spaces[i])
             elif isinstance(what, Card):
                 materials[name] = self._shell(what, name, np.flatnonzero(owner == i), frame)
             else:
-                materials[name] = self._material(self._materials[what], frame)
+                made = self._material(self._materials[what], frame)
+                materials[name] = self._stresses.of(made, stress)
         return Sections(
             materials,
             sets,
-            self._model(thickness.pop()),
+            self._model(all_of.pop()),
             next(iter(self._zeros)) if len(self._zeros) == 1 else None,
             damping.pop(),
         )

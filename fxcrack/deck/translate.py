@@ -18,6 +18,7 @@ from fxcrack.deck.explicit import bulk_viscosity
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
+from fxcrack.deck.initial_stress import InitialStress
 from fxcrack.deck.loads import Loads
 from fxcrack.deck.model import Family, Model
 from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
@@ -130,7 +131,10 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         temperatures.take(thermal, amplitudes, procedure.period)
         grow = contacts.take(number, of_step)
         steps.append(DeckStep(family.name, procedure.step, tuple(grow), grow))
-    sections = read_sections(flat, groups, report)
+    stresses = InitialStress(_initial(cards, "STRESS"), flat)
+    if stresses.card is not None and temperatures.first is not None:
+        stresses.card.fail("initial stresses beside temperatures are not available; leave one out")
+    sections = read_sections(flat, groups, report, stresses)
     _check_finite(finite, sections, model)
     if flat.kind.shell:
         check_shells(procedures, loads)
@@ -178,7 +182,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
             temperatures,
             starting_velocity(_initial(cards, "VELOCITY"), flat),
             finite=finite,
-        ),
+        )
+        + stresses.effects(procedures, report),
     }
     raw = groups.raw_mesh()
     _tell(report, flat, sections.sets, arguments, steps)
@@ -274,7 +279,9 @@ def _initial(cards: Sequence[Card], kind: str) -> list[Card]:
     found = []
     for card in cards:
         if card.keyword == "INITIALCONDITIONS":
-            given = card.choose("TYPE", ("CONTACT", "TEMPERATURE", "VELOCITY"), card.text("TYPE"))
+            given = card.choose(
+                "TYPE", ("CONTACT", "STRESS", "TEMPERATURE", "VELOCITY"), card.text("TYPE")
+            )
             if given == kind:
                 found.append(card)
     return found

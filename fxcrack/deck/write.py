@@ -241,6 +241,8 @@ class _Writer:
 
     def _interface(self, pair: Pair, interface: Interface, debonds: bool) -> list[str]:
         title = interface.title
+        if interface.is_rigid:
+            refuse(f"interface '{title}': a rigid surface as master")
         if interface.stiffness is not None:
             refuse(f"interface '{title}': stiffness of bonds")
         if interface.pairing is not None and self.explicit:
@@ -251,6 +253,7 @@ class _Writer:
         out: list[str] = []
         if self.mesh is not None:
             for name, face in ((slave, pair.sides[0]), (master, pair.sides[1])):
+                assert isinstance(face, str | Face)  # rigid ones are refused above
                 out += self._surface(name, face)
         if not debonds and not interface.contact and pair.bonded[pair.paired].all():
             return [*out, f'*TIE, NAME="{title}"{_type(interface)}', f'"{slave}", "{master}"']

@@ -51,6 +51,12 @@ def drop_constrained(
             if not pair.bonded[node]:
                 lost += 1
                 continue
+            if pair.rigid is not None:
+                raise InterfaceError(
+                    f"a coupling or an equation moves the slave node at "
+                    f"{format_point(pair.surface.x[node])} of interface '{pair.title}', which is "
+                    f"bonded to the {pair.rigid}; leave it out of the group"
+                )
             own = _sets(following, dofs[node])
             masters = layout.dofs(pair.masters_under(int(node)))
             alike = all(_sets(following, row) == own for row in masters)

@@ -23,6 +23,7 @@ from fxcrack.base.checks import (
 )
 from fxcrack.base.errors import InputError, InterfaceError
 from fxcrack.continuum.face import Face
+from fxcrack.interface.rigid import RIGID, RigidCylinder, RigidPlane, RigidSphere
 from fxcrack.interface.roles import PAIRINGS
 
 Bonded = str | Callable[[Array], Array] | Array | None
@@ -36,7 +37,9 @@ class Interface:
         slave: Facet group of the slave side, or the face of a shell (:class:`fxcrack.Face`).
         master: Facet group or face of the master side; must extend under every bonded slave node.
             Where the interface ends inside a body both sides share the nodes of that border, which
-            stay bonded.
+            stay bonded. Or a rigid surface that does not move, :class:`fxcrack.RigidPlane`,
+            :class:`fxcrack.RigidCylinder` or :class:`fxcrack.RigidSphere`; it has no nodes, and a
+            jump is the displacement of the slave node.
         bonded: The initially bonded slave nodes: the name of a group, a function of positions of
             shape (3, n) that returns n booleans (nodes on the border of its region are bonded,
             ``>`` and ``>=`` mean the same), an array of booleans per slave node (in the order of
@@ -45,8 +48,17 @@ class Interface:
         friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
             a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.
         normal_only: Bonds hold the opening only and let the faces slip.
+        symmetry: The master is a plane of symmetry (:class:`fxcrack.RigidPlane`), and the scene
+            models one half of the body. Bonds hold the opening only, as with ``normal_only``.
+            Openings that criteria and tables of tips give are those of the whole crack, twice the
+            displacement of the node, and energy release rates are those of the whole body, as are
+            toughness, strength and critical opening; areas count once. All energies of the history,
+            its loads and reactions, and the openings of written fields are those of the half that
+            is modelled: a bond dissipates half the toughness times its area, so that the energies
+            balance. Without it, rates and openings are those of a body on a rigid support: half as
+            large.
         tolerance: Search tolerance, length: how far a slave node may lie from the master surface;
-            a tenth of the master's facet size by default.
+            a tenth of the master's facet size by default, of the slave's on a rigid surface.
         pairing: How slave nodes follow the master: "node-to-surface", the point under the node, or
             "surface-to-surface", means over the facets around it. ``None``: node-to-surface where
             both sides have the same nodes and facets, in which case the two are equal, and
@@ -68,7 +80,7 @@ class Interface:
     """
 
     slave: str | Face
-    master: str | Face
+    master: str | Face | RigidPlane | RigidCylinder | RigidSphere
     bonded: Bonded = None
     contact: bool = False
     friction: float | Callable[[Array], npt.ArrayLike] | None = None
@@ -79,11 +91,13 @@ class Interface:
     strict: bool = False
     stiffness: str | tuple[float, float, float] | None = None
     name: str | None = None
+    symmetry: bool = False
 
     def __post_init__(self) -> None:
         """Refuse contradictions that need no mesh."""
         for name, value in (("slave", self.slave), ("master", self.master)):
-            if not isinstance(value, Face):
+            rigid = name == "master" and isinstance(value, RIGID)
+            if not isinstance(value, Face) and not rigid:
                 text("Interface", name, value)
         text("Interface", "name", self.name, optional=True)
         if self.slave == self.master:
@@ -93,7 +107,7 @@ class Interface:
                 "mesh becomes two by read_mesh(path, split=[Split(...)]))"
             )
         where = f"interface '{self.title}'"
-        for name in ("contact", "normal_only", "strict"):
+        for name in ("contact", "normal_only", "strict", "symmetry"):
             keep(self, **{name: flag(where, name, getattr(self, name))})
         check_bonded(where, self.bonded)
         if self.tolerance is not None and not (
@@ -107,8 +121,36 @@ class Interface:
             one_of(where, "pairing", self.pairing, PAIRINGS)
         if not isinstance(self.gap, str) or self.gap not in ("adjust", "keep"):
             raise InterfaceError(f"gap = {shown(self.gap)}: choose 'adjust' or 'keep'")
+        self._check_rigid(where)
         self._check_friction()
         self._check_stiffness(where)
+
+    def _check_rigid(self, where: str) -> None:
+        """Refuse what a rigid master, or a plane of symmetry, cannot have."""
+        if self.symmetry:
+            if not isinstance(self.master, RigidPlane):
+                raise InterfaceError(
+                    f"{where}: symmetry=True needs a plane of symmetry as its master, "
+                    f"fxcrack.RigidPlane(point, normal), not {shown(self.master)}"
+                )
+            if self.friction is not None:
+                raise InterfaceError(
+                    f"{where}: friction is not possible on a plane of symmetry, where both halves "
+                    "slide alike; leave out friction, or leave out symmetry=True if the plane is a "
+                    "rigid support"
+                )
+            keep(self, normal_only=True)
+        if not isinstance(self.master, RIGID):
+            return
+        if self.pairing == "surface-to-surface":
+            raise InterfaceError(
+                f"{where}: a rigid surface has no facets to average over; leave pairing out"
+            )
+        if self.stiffness is not None:
+            raise InterfaceError(
+                f"{where}: bonds with a stiffness are not available on a rigid surface; leave "
+                "stiffness out"
+            )
 
     def _check_stiffness(self, where: str) -> None:
         if isinstance(self.stiffness, str) and self.stiffness in ("auto", "arms"):
@@ -146,6 +188,24 @@ class Interface:
                     "such as 0.3, or a function of positions"
                 ) from error
             check_coefficients(np.array([mu]), where)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether the master is a rigid surface."""
+        return isinstance(self.master, RIGID)
+
+    @property
+    def mode_i_only(self) -> bool:
+        """Whether criteria see the opening alone: the master is rigid, and the face slips on it.
+
+        Bonds carry no shear there, and what the face slips is no jump between the faces of a crack.
+        """
+        return self.is_rigid and self.normal_only
+
+    @property
+    def opening_factor(self) -> float:
+        """Opening of the whole crack over the jump of a node: 2 on a plane of symmetry."""
+        return 2.0 if self.symmetry else 1.0
 
     @property
     def title(self) -> str:

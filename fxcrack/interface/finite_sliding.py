@@ -19,22 +19,24 @@ import numpy.typing as npt
 import scipy.sparse as sp
 
 from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.interface.frames import local_frames
 from fxcrack.interface.mortar import surface_weights
 from fxcrack.interface.pair import Pair
-from fxcrack.interface.pairing import local_frames
 from fxcrack.interface.projection import project
+from fxcrack.interface.rigid import RigidSurface
+from fxcrack.interface.rigid_pairing import renewed_on
 from fxcrack.interface.surface import FacetSurface
 
 _SLIDE = 0.01
 """Part of a facet a node may slide, and angle its normal may turn, before it is paired anew."""
 _NEAR = 0.5
 """Parts of a facet within which a gap may close in the next increment."""
-CHANGING = ("paired", "masters", "weights", "frames", "gap")
-"""What a new pairing changes of a pair."""
+_OF_MASTERS = ("masters", "weights")
+_CHANGING = ("paired", "frames", "gap")
 
 
 def renewed(
-    pair: Pair, bonded: Bools, master: FacetSurface, u_slave: Array, u_master: Array
+    pair: Pair, bonded: Bools, master: FacetSurface | RigidSurface, u_slave: Array, u_master: Array
 ) -> Pair | None:
     """A pair with its open nodes projected on the present master surface.
 
@@ -43,7 +45,8 @@ def renewed(
         bonded: Slave nodes that are bonded now, or whose bonds still pull, shape (n_nodes,).
         master: Undeformed master surface.
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
-        u_master: Displacements of the master nodes, shape (master.n_nodes, gdim), length.
+        u_master: Displacements of the master nodes, shape (master.n_nodes, gdim), length; none,
+            shape (0, gdim), of a rigid surface.
 
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
@@ -51,6 +54,8 @@ def renewed(
     if pair.hierarchy is not None:
         found = renewed(pair.by_nodes(), bonded, master, u_slave, u_master)
         return None if found is None else found.by_corners()
+    if not isinstance(master, FacetSurface):
+        return renewed_on(pair, bonded, u_slave)
     gdim = u_slave.shape[1]
     x, y = pair.surface.x.copy(), master.x.copy()
     x[:, :gdim] += u_slave
@@ -125,24 +130,32 @@ def _nodes_of(master: FacetSurface, dofs: Ints) -> Ints:
     return np.asarray(order[np.searchsorted(master.dofs[order], dofs)])
 
 
-def changing(pair: Pair, master: FacetSurface) -> dict[str, npt.NDArray[Any]]:
-    """:data:`CHANGING` of a pair, independent of the number of ranks.
+def names_changing(master: FacetSurface | RigidSurface) -> tuple[str, ...]:
+    """Attributes of a pair that a new pairing changes."""
+    return _CHANGING + _OF_MASTERS if isinstance(master, FacetSurface) else _CHANGING
+
+
+def changing(pair: Pair, master: FacetSurface | RigidSurface) -> dict[str, npt.NDArray[Any]]:
+    """What a new pairing changes of a pair, independent of the number of ranks.
 
     Args:
         pair: The pair.
         master: Its master surface.
 
     Returns:
-        Arrays by name, shapes as in :class:`Pair`; "masters", shape (n_nodes, k), as node numbers
-        of the master surface.
+        Arrays by the names of :func:`names_changing`, shapes as in :class:`Pair`; "masters", shape
+        (n_nodes, k), as node numbers of the master surface.
     """
     pair = pair.by_nodes()
-    return {name: getattr(pair, name) for name in CHANGING} | {
-        "masters": _nodes_of(master, pair.masters)
-    }
+    out = {name: getattr(pair, name) for name in names_changing(master)}
+    if isinstance(master, FacetSurface):
+        out["masters"] = _nodes_of(master, pair.masters)
+    return out
 
 
-def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray[Any]]) -> Pair:
+def with_changing(
+    pair: Pair, master: FacetSurface | RigidSurface, known: dict[str, npt.NDArray[Any]]
+) -> Pair:
     """A pair with the arrays of :func:`changing`.
 
     Args:
@@ -150,7 +163,9 @@ def with_changing(pair: Pair, master: FacetSurface, known: dict[str, npt.NDArray
         master: Its master surface.
         known: From :func:`changing`, same shapes, on any number of ranks.
     """
-    nodes = known["masters"]
-    changed = {**known, "masters": master.dofs[nodes], "master_maps": master.maps_at(nodes)}
+    changed: dict[str, Any] = dict(known)
+    if isinstance(master, FacetSurface):
+        nodes = known["masters"]
+        changed |= {"masters": master.dofs[nodes], "master_maps": master.maps_at(nodes)}
     found = replace(pair.by_nodes(), **changed)
     return found if pair.hierarchy is None else found.by_corners()

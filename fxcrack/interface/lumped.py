@@ -101,7 +101,8 @@ class LumpedInterface:
         gdim = layout.gdim
         self.jumped = [p.paired.copy() for p in pairs]
         self.nodes = nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=self.jumped)
-        self.which, self.value = supports.at_nodes(nodes)
+        which, value = supports.at_nodes(nodes)
+        self.which, self.value = which[:, :gdim], value[:, :gdim]
         check_slaves(pairs, self.jumped, nodes, self.which, self.value, supports)
         self.mass = nodes.gather(mass)[:, 0] if len(nodes) else np.zeros(0)
         at_slaves = [

@@ -13,6 +13,7 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.face import Face
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.hierarchy import Hierarchy, linked
+from fxcrack.interface.rigid import RIGID, RigidSurface
 from fxcrack.interface.surface import FacetSurface
 
 
@@ -27,7 +28,8 @@ class Pair:
             nor front.
         paired: Slave nodes that have a master point, shape (n_nodes,); not the nodes of a border
             inside a body, which belong to both sides.
-        masters: Global displacement nodes of the masters, shape (n_nodes, k).
+        masters: Global displacement nodes of the masters, shape (n_nodes, k); k = 0 on a rigid
+            surface.
         weights: Their weights, shape (n_nodes, k).
         frames: Columns n, t1, t2 (n, t in 2-D), shape (n_nodes, gdim, gdim).
         gap: Initial normal gap, shape (n_nodes,), length.
@@ -46,6 +48,7 @@ class Pair:
             (:mod:`fxcrack.interface.hierarchy`). ``surface`` consists of first-order triangles
             then, and masters and weights of these nodes hold their corners. ``None`` where each
             node has its own jump.
+        rigid: The master, where it is a rigid surface, which has no nodes; ``None`` elsewhere.
     """
 
     interface: Interface
@@ -62,6 +65,7 @@ class Pair:
     exchanged: bool = False
     whole: FacetSurface | None = None
     hierarchy: Hierarchy | None = None
+    rigid: RigidSurface | None = None
 
     @property
     def title(self) -> str:
@@ -69,10 +73,12 @@ class Pair:
         return self.interface.title
 
     @property
-    def sides(self) -> tuple[str | Face, str | Face]:
+    def sides(self) -> tuple[str | Face, str | Face | RigidSurface]:
         """The side whose nodes hold the jumps, and the other one."""
         slave, master = self.interface.slave, self.interface.master
-        return (master, slave) if self.exchanged else (slave, master)
+        if self.exchanged and not isinstance(master, RIGID):
+            return master, slave
+        return slave, master
 
     @property
     def whole_surface(self) -> FacetSurface:

@@ -22,10 +22,13 @@ from fxcrack.base.errors import InterfaceError
 from fxcrack.base.positions import as_marks, marks_at, numbers_at
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.definition import Interface, check_coefficients
+from fxcrack.interface.frames import local_frames
 from fxcrack.interface.hierarchy import corner_surface, is_hierarchical
 from fxcrack.interface.mortar import surface_weights
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.projection import project
+from fxcrack.interface.rigid import RIGID, RigidSurface
+from fxcrack.interface.rigid_pairing import check_symmetry, find_partners
 from fxcrack.interface.roles import (
     Role,
     choose_role,
@@ -59,27 +62,6 @@ def friction_of(interface: Interface, surface: FacetSurface) -> Array | None:
     mu = numbers_at(where, "friction", chosen, surface.x, error=InterfaceError)
     check_coefficients(mu, where)
     return mu
-
-
-def local_frames(normals: Array, gdim: int) -> Array:
-    """Orthonormal frames whose first column is the normal.
-
-    Args:
-        normals: Unit normals, shape (n, 3).
-        gdim: 2 or 3.
-
-    Returns:
-        Shape (n, gdim, gdim); in 3-D the first tangent is the global axis most nearly in the
-        tangent plane, projected.
-    """
-    if gdim == 2:
-        n = normals[:, :2]
-        return np.stack([n, np.stack([-n[:, 1], n[:, 0]], axis=1)], axis=2)
-    axis = np.argmin(np.abs(normals) - 1e-6 * np.array([2.0, 1.0, 0.0]), axis=1)
-    reference = np.eye(3)[axis]
-    t1 = reference - np.einsum("ni,ni->n", reference, normals)[:, None] * normals
-    t1 /= np.linalg.norm(t1, axis=1, keepdims=True)
-    return np.stack([normals, t1, np.cross(normals, t1)], axis=2)
 
 
 def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continuum) -> Bools:
@@ -195,6 +177,8 @@ def make_pair(
             share nodes other than those of a border inside the body, or the bonded set does not
             fit.
     """
+    if isinstance(interface.master, RIGID):
+        return _on_rigid(continuum, interface, interface.master, cracks=cracks)
     slave = gather_surface(continuum, interface.slave)
     master = gather_surface(continuum, interface.master)
     where = f"interface '{interface.title}'"
@@ -248,13 +232,9 @@ def make_pair(
     if interface.gap == "keep":
         below = np.einsum("nk,nkc->nc", weights, master.x[nodes])
         gap = np.einsum("ni,ni->n", slave.x - below, normals)
-    inside = (paired | grown)[slave.facets].all(axis=1) if bonded.any() else np.ones(1, dtype=bool)
-    partly = not inside.all() and inside.any()
-    surface = slave.with_facets(inside) if partly else slave
-    by_corners = cracks and is_hierarchical(slave)
     pair = Pair(
         interface=interface,
-        surface=corner_surface(surface) if by_corners else surface,
+        surface=slave,
         paired=paired,
         masters=master.dofs[nodes],
         weights=weights,
@@ -265,13 +245,64 @@ def make_pair(
         master_maps=master.maps_at(nodes),
         feet=feet,
         exchanged=role is Role.EXCHANGED,
-        whole=slave if partly or by_corners else None,
     )
-    if not by_corners:
-        return pair
-    pair = pair.by_corners()
+    return _with_partners(pair, grown, cracks=cracks)
+
+
+def _with_partners(pair: Pair, grown: Bools, *, cracks: bool) -> Pair:
+    """A pair whose surface has only facets with a partner, with hierarchical jumps if it cracks.
+
+    Args:
+        pair: The pair, its surface whole.
+        grown: Slave nodes that are master nodes as well, shape (n_nodes,).
+        cracks: As for :func:`make_pair`.
+    """
+    slave, bonded = pair.surface, pair.bonded
+    inside: Bools = np.ones(1, dtype=bool)
+    if bonded.any():
+        inside = (pair.paired | grown)[slave.facets].all(axis=1)
+    partly = not inside.all() and inside.any()
+    surface = slave.with_facets(inside) if partly else slave
+    if not (cracks and is_hierarchical(slave)):
+        return replace(pair, surface=surface, whole=slave if partly else None)
+    pair = replace(pair, surface=corner_surface(surface), whole=slave).by_corners()
     assert pair.hierarchy is not None
     return replace(pair, bonded=pair.hierarchy.bonded(bonded) | grown)
+
+
+def _on_rigid(
+    continuum: Continuum, interface: Interface, master: RigidSurface, *, cracks: bool
+) -> Pair:
+    """Pair a slave surface with a rigid one, which has no nodes; collective.
+
+    Raises:
+        InterfaceError: A bonded node does not lie on the surface, the body is on its other side,
+            or the surface does not fit the model.
+    """
+    where = f"interface '{interface.title}'"
+    if interface.symmetry:
+        check_symmetry(where, master, continuum.model)
+    slave = gather_surface(continuum, interface.slave)
+    bonded = bonded_nodes(interface, slave, continuum)
+    tolerance = interface.tolerance
+    if tolerance is None:
+        tolerance = 0.1 * slave.facet_size
+    paired, normals, gap = find_partners(master, slave, bonded, tolerance, where, continuum)
+    n, maps = slave.n_nodes, slave.point_maps
+    pair = Pair(
+        interface=interface,
+        surface=slave,
+        paired=paired,
+        masters=np.zeros((n, 0), dtype=np.int64),
+        weights=np.zeros((n, 0)),
+        frames=local_frames(normals, continuum.gdim),
+        gap=gap if interface.gap == "keep" else np.zeros(n),
+        bonded=bonded,
+        friction=friction_of(interface, slave),
+        master_maps=None if maps is None else np.zeros((n, 0, *maps.shape[1:])),
+        rigid=master,
+    )
+    return _with_partners(pair, np.zeros(n, dtype=bool), cracks=cracks)
 
 
 def _shares_nodes(
@@ -281,6 +312,8 @@ def _shares_nodes(
     own = np.concatenate([side.dofs for side in sides])
     for other in others:
         for name in (other.slave, other.master):
+            if isinstance(name, RIGID):
+                continue
             if np.isin(gather_surface(continuum, name).dofs, own).any():
                 return True
     return False

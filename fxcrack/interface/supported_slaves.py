@@ -180,6 +180,14 @@ def check_slaves(
     for pair, taking_part in zip(pairs, jumped, strict=True):
         for node in np.flatnonzero(taking_part):
             dof = int(pair.surface.dofs[node])
+            if dof in seen and pair.rigid is not None:
+                raise InterfaceError(
+                    f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
+                    f"'{seen[dof]}' and of '{pair.title}', and a node can be a slave only once; on "
+                    "a plane of symmetry without a crack take Displacement(group, x=0.0) in place "
+                    "of an interface, and where cracks run in both let the slave surface of one "
+                    "end before the common edge"
+                )
             if dof in seen:
                 raise InterfaceError(
                     f"the node at {format_point(pair.surface.x[node])} is a slave of interface "
@@ -195,13 +203,20 @@ def check_slaves(
         supported[taking_part] = (displacement >= 0).any(axis=1)
         for node in np.flatnonzero(supported):
             masters = nodes.find(pair.masters_under(int(node)))
-            column = _unshared_support(
-                which[slave[node], : nodes.layout.gdim], value[slave[node]],
-                which[masters], value[masters], supports,
-            )  # fmt: skip
+            own = which[slave[node], : nodes.layout.gdim], value[slave[node]]
+            if pair.rigid is not None:
+                column = _moving_support(pair, int(node), *own, supports)
+            else:
+                column = _unshared_support(*own, which[masters], value[masters], supports)
             if column is None:
                 _check_points_held(pair, int(node), which[slave[node]], which[masters], supports)
                 continue
+            if pair.bonded[node] and pair.rigid is not None:
+                raise InterfaceError(
+                    f"support '{column.title}' moves the slave node at "
+                    f"{format_point(pair.surface.x[node])} of interface '{pair.title}', which is "
+                    f"bonded to the {pair.rigid}; end the support before the bonded part"
+                )
             if pair.bonded[node]:
                 raise InterfaceError(
                     f"support '{column.title}' holds the slave node at "
@@ -249,6 +264,35 @@ def _check_points_held(
             f"'{pair.title}', but not the director that moves its face; hold both by Symmetry or "
             "Clamp, or end the support before the bonded part"
         )
+
+
+_ALONG = 1e-8
+"""Component of a normal below which an axis lies along the surface."""
+
+
+def _moving_support(
+    pair: Pair, node: int, which: Ints, value: Array, supports: Supports
+) -> SupportColumn | None:
+    """A support that moves a slave node against the rigid surface it is paired with.
+
+    One that moves it along a plane it may slide on without friction is none of these.
+
+    Args:
+        pair: Interface with a rigid master.
+        node: Slave node.
+        which: Support columns of its displacement, -1 if free, shape (gdim,).
+        value: Entries of these columns, shape (gdim,) or longer.
+        supports: The columns.
+    """
+    assert pair.rigid is not None
+    slides = pair.rigid.flat and pair.friction is None
+    slides &= pair.interface.normal_only or not pair.bonded[node]
+    for c in np.flatnonzero(which >= 0):
+        column = supports.columns[int(which[c])]
+        across = abs(float(pair.frames[node, c, 0])) > _ALONG
+        if column.moves and value[c] != 0.0 and (across or not slides):
+            return column
+    return None
 
 
 def _unshared_support(

@@ -210,13 +210,13 @@ class Solver(AnySolver, Protocol):
     def restore_interfaces(self, saved: InterfaceState) -> None:
         """Return to an earlier state of the interfaces alone, on the same retained jumps."""
 
-    def undo(self, saved: InterfaceState, rebases: int) -> None:
-        """Return to an earlier state of the interfaces, be the retained jumps others since.
+    def undo(self, saved: Any, rebases: int) -> None:
+        """Return to an earlier state, be the retained jumps others since.
 
         Collective.
 
         Args:
-            saved: The state.
+            saved: From :meth:`remember`.
             rebases: Value of :attr:`rebases` then.
         """
 

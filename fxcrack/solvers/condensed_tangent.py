@@ -64,7 +64,7 @@ def condense_tangent(
         The dense system through the accepted state.
     """
     bodies = tangent.bodies
-    n_borders = tangent.assemble(request.followed)
+    n_borders = tangent.assemble(request.pairs, request.followed)
     tangent.release_memory()
     start = time.perf_counter()
     coordinates = build_coordinates(

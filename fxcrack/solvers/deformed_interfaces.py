@@ -11,13 +11,15 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.face import Face
 from fxcrack.equilibrium.cohesive_bonds import CohesiveBonds
-from fxcrack.interface.finite_sliding import CHANGING, changing, renewed, with_changing
+from fxcrack.interface.finite_sliding import changing, names_changing, renewed, with_changing
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
 from fxcrack.interface.nodes import JumpGather
 from fxcrack.interface.pair import Pair
-from fxcrack.interface.surface import gather_surface
+from fxcrack.interface.rigid import RigidSurface
+from fxcrack.interface.surface import FacetSurface, gather_surface
 from fxcrack.solvers.increment_work import IncrementWork
 
 
@@ -38,11 +40,10 @@ class DeformedInterfaces:
         self._gdim = continuum.gdim
         # undeformed master surfaces of those whose pairing is renewed
         self._masters = [
-            gather_surface(continuum, p.sides[1]) if finite and p.interface.contact else None
-            for p in pairs
+            _master_of(continuum, p) if finite and p.interface.contact else None for p in pairs
         ]
         self._undeformed = [p.surface.x for p in pairs]
-        known = [m for m in self._masters if m is not None]
+        known = [m for m in self._masters if isinstance(m, FacetSurface)]
         self._reader = JumpGather(continuum.layout, pairs, known)
 
     @property
@@ -94,7 +95,9 @@ class DeformedInterfaces:
                 self._fronts[p].bonded | pulling[p],
                 master,
                 self._reader.displacements(values, pair.surface),
-                self._reader.displacements(values, master),
+                self._reader.displacements(values, master)
+                if isinstance(master, FacetSurface)
+                else np.zeros((0, self._gdim)),
             )
             if new is not None:
                 self._pairs[p], changed = new, True
@@ -122,8 +125,16 @@ class DeformedInterfaces:
         """
         for p, master in enumerate(self._masters):
             if master is not None:
-                known = {name: arrays[key.format(name, p)] for name in CHANGING}
+                known = {name: arrays[key.format(name, p)] for name in names_changing(master)}
                 self._pairs[p] = with_changing(self._pairs[p], master, known)
+
+
+def _master_of(continuum: Continuum, pair: Pair) -> FacetSurface | RigidSurface:
+    """Undeformed master surface of a pair; collective."""
+    master = pair.sides[1]
+    if isinstance(master, str | Face):
+        return gather_surface(continuum, master)
+    return master
 
 
 def pulling(index: list[Ints], force: Array, soft: CohesiveBonds) -> list[Bools]:

@@ -33,7 +33,7 @@ from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.continuum.loads import Load, Monitor
-from fxcrack.continuum.lumped_mass import lumped_mass
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.starting_velocity import starting_velocity
 from fxcrack.continuum.term import Term
 from fxcrack.equilibrium.contact import Equilibrium
@@ -114,7 +114,7 @@ class ExplicitSolver:
         self.bodies = InternalForces(continuum, [t for t in terms if t not in following])
         self._effect = effect
         self.further = FurtherForces(continuum, following, self.bodies.u)
-        self.mass = ScaledMass(lumped_mass(continuum, effect))
+        self.mass = ScaledMass.of(continuum, effect)
         self._velocity = starting_velocity(continuum, effect.velocity)
         self._velocity_whole = True  # at interface nodes as well
         self.at, self.increments = 0.0, 0
@@ -233,7 +233,9 @@ class ExplicitSolver:
         self._outer.factors = coordinates[len(self.supports.columns) :]
         self.bodies.begin(self.at)
         self.energies.heated = self._accounts.thermal_part(*self._middle())
-        self.energies.initial = sum(self.stored_now().values())
+        stored = self.stored_now()
+        stored.pop("mass_scaling_energy", None)  # part of the kinetic energy
+        self.energies.initial = sum(stored.values())
 
     # -- one increment -------------------------------------------------------------------
 
@@ -471,7 +473,9 @@ class ExplicitSolver:
     def about(self) -> dict[str, Any]:
         """What is worth keeping with a history, plain types."""
         choice = self.bodies.choice
-        return {
+        shells = isinstance(self.continuum, ShellBodies)
+        more = {"director_inertia": self.mass.director_factor(self.continuum)} if shells else {}
+        return more | {
             "increments": self.increments,
             "dt": self.dt,
             "stable_increment": self.stable,

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.continuum.lumped_mass import lumped_mass
+from fxcrack.continuum.shell_bodies import ShellBodies
+from fxcrack.continuum.shell_mass import shell_mass
 from fxcrack.solvers.options import ExplicitOptions
 
 
@@ -14,19 +19,49 @@ class ScaledMass:
 
     Args:
         bare: Lumped mass of the bodies, shape (n_local,), mass.
+        enlarged: What of it was added to the inertia of the directors of shells, same shape.
 
     Attributes:
         values: Present mass, shape (n_local,).
         inverse: One over it, shape (n_local,).
-        added: What mass scaling has added, shape (n_local,).
-        is_scaled: Whether mass scaling has been at work.
+        added: What mass scaling has added, and to directors, shape (n_local,).
+        is_scaled: Whether there is any of it.
     """
 
-    def __init__(self, bare: Array) -> None:
-        self._bare = bare
-        self.values, self.added = bare.copy(), np.zeros(len(bare))
+    def __init__(self, bare: Array, enlarged: Array | None = None) -> None:
+        self._bare, self._enlarged = bare, np.zeros(len(bare)) if enlarged is None else enlarged
+        self.values, self.added = bare.copy(), self._enlarged.copy()
         self.inverse = 1.0 / self.values
-        self.is_scaled = False
+        self.is_scaled = enlarged is not None
+        self._chosen = False
+
+    @classmethod
+    def of(cls, continuum: Continuum, effect: Inertia) -> ScaledMass:
+        """Mass of bodies; collective.
+
+        Args:
+            continuum: Solids or shells of first order.
+            effect: Their density.
+
+        Raises:
+            InputError: A part has no density, or elements have no lumped mass.
+        """
+        if isinstance(continuum, ShellBodies):
+            return cls(*shell_mass(continuum, effect))
+        return cls(lumped_mass(continuum, effect))
+
+    def director_factor(self, continuum: Continuum) -> float:
+        """Inertia of all directors over what it is without the addition; 1 in solids; collective.
+
+        Args:
+            continuum: The bodies.
+        """
+        added, bare = (
+            float(continuum.layout.by_node(m)[:, continuum.gdim :].sum())
+            for m in (self._enlarged, self._bare)
+        )
+        added, bare = continuum.comm.allreduce(added), continuum.comm.allreduce(bare)
+        return bare / (bare - added) if added else 1.0
 
     def choose(self, options: ExplicitOptions, bodies: InternalForces) -> bool:
         """Scale the mass as a step asks for; collective.
@@ -41,11 +76,12 @@ class ScaledMass:
         if isinstance(options.mass_scale, str):
             assert options.dt is not None
             mass = self._enough_for(options.dt, bodies)
-        elif options.mass_scale != 1.0 or self.is_scaled:
+        elif options.mass_scale != 1.0 or self._chosen:
             mass = options.mass_scale * self._bare
         else:
             return False
-        self.values, self.added, self.is_scaled = mass, mass - self._bare, True
+        self.values, self.added = mass, mass - self._bare + self._enlarged
+        self.is_scaled = self._chosen = True
         self.inverse = 1.0 / mass
         return True
 
@@ -55,11 +91,25 @@ class ScaledMass:
         Nodes get as much as Gershgorin's circles ask for, sum_j |K_ij|/m_i <= (2/dt)^2, which is
         more than needed but leaves all other nodes alone.
         """
-        layout = bodies.continuum.layout
-        sums = np.asarray(abs(bodies.stiffness()).sum(axis=1)).ravel()
-        by_node = layout.by_node(sums).max(axis=1)
-        needed = np.repeat(0.25 * (1.0 + 1e-9) * dt**2 * by_node, bodies.continuum.gdim)
-        return np.maximum(self._bare, needed)
+        continuum = bodies.continuum
+        layout, stiffness = continuum.layout, abs(bodies.stiffness())
+        scale = np.ones(layout.n_unknowns)
+        scale[continuum.gdim :] = self._per_length(continuum)
+        sums = np.asarray(stiffness @ np.tile(scale, stiffness.shape[1] // len(scale)))
+        by_node = layout.by_node(sums) / scale
+        for unknowns in (slice(0, continuum.gdim), slice(continuum.gdim, None)):
+            by_node[:, unknowns] = by_node[:, unknowns].max(axis=1, keepdims=True, initial=0.0)
+        return np.maximum(self._bare, (0.25 * (1.0 + 1e-9) * dt**2 * by_node).ravel())
+
+    def _per_length(self, continuum: Continuum) -> float:
+        """Directors over displacements of equal inertia, 1/length; collective.
+
+        Gershgorin's circles hold for unknowns of any scale; those of directors are of another unit.
+        """
+        by_node = continuum.layout.by_node(self._bare)
+        parts = [float(by_node[:, c].sum()) for c in (0, -1)]
+        mass, inertia = (continuum.comm.allreduce(p) for p in parts)
+        return float(np.sqrt(mass / inertia))
 
 
 __all__ = ["ScaledMass"]

@@ -12,6 +12,7 @@ from fxcrack.base.errors import InputError
 from fxcrack.continuum.bulk_viscosity import BulkViscosity
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 from fxcrack.solvers.options import ExplicitOptions
@@ -59,7 +60,8 @@ class Stability:
         if not (linear or quadratic):
             return False
         continuum = self._bodies.continuum
-        if self._bodies.finite or continuum.shell_cells:
+        shells = isinstance(continuum, ShellBodies) or continuum.shell_cells
+        if self._bodies.finite or shells:
             raise InputError(
                 "Explicit: bulk viscosity is for solids of small strain: the volume change it "
                 "counts is that of small rotations; leave bulk out"
@@ -82,7 +84,7 @@ class Stability:
         """
         continuum = self._bodies.continuum
         places = continuum.positions()[: continuum.layout.n_owned]
-        start = start_vector(places, continuum.gdim)
+        start = start_vector(places, continuum.layout.n_unknowns)
         self._highest = HighestFrequency(continuum.comm, mass, start)
         self._damping = HighestFrequency(continuum.comm, mass, start)
         return self._by(STEPS, velocity)

@@ -48,6 +48,11 @@ class CondensedFrontProbe:
         """The interface, paired anew where its faces slide."""
         return self._solver.pairs[self._p]
 
+    @property
+    def _opening_factor(self) -> float:
+        """Opening of the whole crack over the jump of a node, 2 on a plane of symmetry."""
+        return self.pair.interface.opening_factor
+
     def bond_forces(self, nodes: Ints, state: Equilibrium) -> Array:
         """Bond forces, tension positive, global vectors of shape (..., 3) [force]."""
         solver = self._solver
@@ -85,7 +90,12 @@ class CondensedFrontProbe:
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""
-        return self._solver.vectors(self._p, nodes, state.jump)
+        jump = self._opening_factor * self._solver.vectors(self._p, nodes, state.jump)
+        if not self.pair.interface.mode_i_only:
+            return jump
+        normal = np.zeros_like(jump)
+        normal[..., : self.gdim] = self._solver.frames[self._p][nodes][..., 0]
+        return np.asarray(np.einsum("...c,...c->...", normal, jump)[..., None] * normal)
 
     @property
     def has_face_loads(self) -> bool:
@@ -103,7 +113,7 @@ class CondensedFrontProbe:
         """Jumps that releasing some nodes would open, global vectors of shape (k, 3) [length]."""
         index, frames = self._solver.index[self._p][nodes], self._solver.frames[self._p][nodes]
         local = np.einsum("kci,kc->ki", frames, force[:, : self.gdim])
-        return self._released(index, index >= 0, local, frames, normal)
+        return self._opening_factor * self._released(index, index >= 0, local, frames, normal)
 
     def _released(
         self, index: Ints, free: Bools, force: Array, frames: Array, normal: Array | None

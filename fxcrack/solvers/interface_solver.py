@@ -225,22 +225,6 @@ class InterfaceSolver(ABC):
             # the set it had, so that the history goes on on the same one
             self._resumed_roles = [arrays[name].astype(np.int8) for name in names]
 
-    def undo(self, saved: InterfaceState, rebases: int) -> None:
-        """Return to an earlier state of the interfaces, be the retained jumps others since.
-
-        Collective.
-
-        Args:
-            saved: The state.
-            rebases: Value of :attr:`rebases` then.
-        """
-        if self.rebases == rebases:
-            self.restore_interfaces(saved)
-            return
-        saved.restore_bonds(self.fronts)
-        self._retain(saved)
-        self.rebases += 1
-
     def _retain(self, state: InterfaceState) -> None:
         """Condense onto another set of retained jumps, and carry a state over."""
         roles = self._resumed_roles or self._choose_roles(state)

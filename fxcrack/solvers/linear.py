@@ -121,7 +121,7 @@ class LinearSolver(InterfaceSolver):
         """K; it and the borders are made on first use; collective."""
         if self.stiffness is None:
             start = time.perf_counter()
-            check_held(self.continuum, self.supports)
+            check_held(self.continuum, self.supports, self.pairs)
             self.continuum.compile()
             self.timings.add("compile", start)
             start = time.perf_counter()
@@ -252,6 +252,22 @@ class LinearSolver(InterfaceSolver):
     def recall(self, saved: InterfaceState) -> None:
         """Return to an earlier state on the same retained jumps."""
         self.restore_interfaces(saved)
+
+    def undo(self, saved: InterfaceState, rebases: int) -> None:
+        """Return to an earlier state of the interfaces, be the retained jumps others since.
+
+        Collective.
+
+        Args:
+            saved: The state.
+            rebases: Value of :attr:`rebases` then.
+        """
+        if self.rebases == rebases:
+            self.restore_interfaces(saved)
+            return
+        saved.restore_bonds(self.fronts)
+        self._retain(saved)
+        self.rebases += 1
 
     # -- energies and fields -------------------------------------------------------------
 

@@ -398,8 +398,13 @@ class NewtonSolver(InterfaceSolver):
             self.pairing.energy,
         )
 
-    def recall(self, saved: NewtonState) -> None:
-        """Return to an earlier accepted state; collective."""
+    def recall(self, saved: NewtonState, *, retained: bool = True) -> None:
+        """Return to an earlier accepted state; collective.
+
+        Args:
+            saved: The state.
+            retained: Whether the retained jumps are still those of then.
+        """
         self._account.give_up()
         self.energy.forget()
         here = min(self.continuum.comm.allgather(np.array_equal(self.u.array_r, saved.u)))
@@ -407,7 +412,7 @@ class NewtonSolver(InterfaceSolver):
         self.at = saved.at
         for term, kept in zip(self.bodies.terms, saved.terms, strict=True):
             term.restore(kept)
-        same = all(a is b for a, b in zip(saved.pairs, self.pairs, strict=True))
+        same = retained and all(a is b for a, b in zip(saved.pairs, self.pairs, strict=True))
         if not (same and here):
             self.tangent.accept()  # that of a state which is rejected as well
             self.tangent.drift = np.inf
@@ -421,6 +426,12 @@ class NewtonSolver(InterfaceSolver):
         self._return()
         self.pairing.forget()
         self.pairing.energy = saved.pairing_energy
+
+    def undo(self, saved: NewtonState, rebases: int) -> None:
+        """See :meth:`fxcrack.solvers.base.Solver.undo`."""
+        retained = self.rebases == rebases
+        self.recall(saved, retained=retained)
+        self.rebases += not retained
 
     def collect(self) -> Arrays:
         """The accepted state as plain arrays; collective.

@@ -24,19 +24,21 @@ STEPS = 24
 """Lanczos steps; enough for a quarter of a percent on even and uneven meshes."""
 
 
-def start_vector(positions: Array, gdim: int) -> Array:
+def start_vector(positions: Array, n_unknowns: int) -> Array:
     """A vector with a part in every mode, of the positions of nodes alone.
 
     Args:
         positions: Of the owned nodes, shape (n, 3), length.
-        gdim: Unknowns of a node.
+        n_unknowns: Unknowns of a node.
 
     Returns:
-        Shape (n gdim,).
+        Shape (n n_unknowns,).
     """
     place = positions @ np.array([12.9898, 78.233, 37.719])
     return np.asarray(
-        (np.sin(1e3 * place)[:, None] + np.cos(7e2 * place[:, None] + np.arange(gdim))).ravel()
+        (
+            np.sin(1e3 * place)[:, None] + np.cos(7e2 * place[:, None] + np.arange(n_unknowns))
+        ).ravel()
     )
 
 

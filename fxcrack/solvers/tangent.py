@@ -6,6 +6,7 @@ S = (K_22 - K_21 K_11^-1 K_12)(u),    offset such that S x + offset are the forc
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import ContactSystem
 from fxcrack.interface.jump_coordinates import JumpCoordinates
+from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 
 _FEW_COLUMNS = 256
@@ -99,10 +101,11 @@ class CondensedTangent:
         self.restraint: FreeBodies | None = None
         self._first = True  # whether no tangent was made yet
 
-    def assemble(self, followed: list[Ints]) -> int:
+    def assemble(self, pairs: Sequence[Pair], followed: list[Ints]) -> int:
         """Compile the forms and make the borders on first use; collective.
 
         Args:
+            pairs: Interfaces.
             followed: Sets of this rank's nodes whose mean displacement is wanted, each of shape
                 (n,).
 
@@ -113,7 +116,7 @@ class CondensedTangent:
             continuum = self.bodies.continuum
             start = time.perf_counter()
             if not self.bodies.dynamic:  # inertia holds every body
-                check_held(continuum, self._supports)
+                check_held(continuum, self._supports, pairs)
             self.bodies.compile()
             self.timings.add("compile", start)
             start = time.perf_counter()

@@ -1,9 +1,9 @@
 """Low-cycle fatigue: what the user may say about a step of cycles, and what cycles leave behind.
 
 A cycle runs between two load states, or once through amplitudes that end where they began. Bodies
-are linear elastic and contact is frictionless, so an equilibrium depends on the loads alone and
-not on the way to them: every cycle is a stabilised one, and solving its corners replaces the
-Fourier series of a direct cyclic analysis exactly.
+are elastic, so an equilibrium without friction depends on the loads alone and not on the way to
+them: every cycle is a stabilised one, and solving its corners replaces the Fourier series of a
+direct cyclic analysis exactly. Friction, on linear bodies, settles over some cycles.
 """
 
 from __future__ import annotations
@@ -37,8 +37,12 @@ class Cycles:
     ==================== =======================================================================
 
     G_max and G_min are the extremes of the total rate on this way, for each tip its own. On a
-    piece without a change of contact they follow from its two ends exactly; other pieces are
-    halved until they are known to ``change`` of G_max.
+    piece of linear bodies without a change of contact they follow from its two ends exactly; other
+    pieces are halved until they are known to ``change`` of G_max.
+
+    On nonlinear bodies (finite strain, pressures that follow, moduli that change with the
+    temperature) each instant is an equilibrium of its own, found on the tangent of the one before.
+    A temperature and pressures that follow must be linear in time between maximum and minimum.
 
     Bonds are released at the maximum of the cycle (with ``period`` at its corner of largest f);
     the step ends there, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any
@@ -52,7 +56,7 @@ class Cycles:
         n_max: Number of cycles after which the step ends.
         until: End condition, or a list of them of which the first met ends the step.
         change: How far G may lie from the parabola between two equilibria, over G_max, where
-            contact changes between them.
+            contact changes between them or bodies are not linear.
     """
 
     maximum: float | None = None

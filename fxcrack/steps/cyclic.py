@@ -1,14 +1,7 @@
 """Steps of load cycles: solve one, jump over those that are like it, release, solve the next.
 
-At each tip the total rate G takes its extremes on the way of the loads through the cycle. Between
-two equilibria without a change of contact, forces and openings are linear in the fraction x of the
-way and G is a parabola in it,
-
-    G(x) = 1/2 F(x) w(x)/A,      dG = max G - min G,
-
-so one dense equilibrium per corner of the cycle is enough; where contact changes in between, the
-piece is halved until its middle lies on that parabola, to a tolerance. The rates at the beginning
-of an element say which tips are next (:func:`fxcrack.criteria.cycle_jump`, over all interfaces),
+The cycle itself is solved by :mod:`fxcrack.steps.cycle_path`. The rates at the beginning of an
+element say which tips are next (:func:`fxcrack.criteria.cycle_jump`, over all interfaces),
 those at its end, once these are released, in how many cycles
 (:func:`fxcrack.criteria.element_cycles`). Where that takes too many, the release is undone.
 """
@@ -17,28 +10,21 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from fxcrack.base import log
-from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.arrays import Bools
 from fxcrack.criteria import (
     CycleJump,
-    CycleRates,
-    Regime,
     cycle_jump,
-    total,
 )
 from fxcrack.criteria.cycle_rates import joined
-from fxcrack.criteria.evaluator import repeat_tips
-from fxcrack.criteria.rate_evaluator import RateEvaluator
-from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import Row
-from fxcrack.interface.tips import Tips
 from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.cycle_equilibria import corners_of, equilibria_of, load_to
+from fxcrack.steps.cycle_path import StabilisedCycle
 from fxcrack.steps.cycle_state import TipCycle
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.driver import StepDriver
@@ -61,18 +47,11 @@ from fxcrack.steps.partial_growth import (
     passed_area,
 )
 from fxcrack.steps.release import release_tips
-from fxcrack.steps.rows import load_columns
 from fxcrack.steps.static import Static
-
-_GRID = np.linspace(0.0, 1.0, 5)
-_HALVINGS = 8
-"""How often a piece of the cycle on which contact changes is halved at most."""
-_SETTLING = 20
-"""Cycles that friction gets to settle."""
 
 
 def run_cycles(analysis: Analysis, step: Cycles, **controls: Any) -> str:
-    """Run a step of load cycles on linear bodies; collective.
+    """Run a step of load cycles; collective.
 
     Rows of the history: "cycle" for the first stabilised cycle; "release", or "unstable" beyond the
     upper limit, after each release with the cycle that follows; "arrest" or "limit". They have the
@@ -112,9 +91,8 @@ class _Cycling:
         self._limit = analysis.fatigue.N + cycles.n_max
         self._seen: list[TipCycle] = []
         self._partly = False
-        columns = load_columns(analysis.solver)
-        names = [load if moves else answer for load, answer, moves in columns]
-        self._corners = cycles.corners(analysis.loads_at, analysis.load_breaks(), names)
+        self._cycle = StabilisedCycle(analysis, equilibria_of(analysis), cycles.change)
+        self._corners = corners_of(analysis, cycles)
 
     def step(self, driver: StepDriver) -> str:
         """Solve a cycle, jump, release, until an end condition holds; why the step ended."""
@@ -178,19 +156,17 @@ class _Cycling:
                 row[f"a[{g.title}]"] = g.extent.length(v.tips) + grown
         return row
 
-    # -- one cycle -----------------------------------------------------------------------
-
     def _go_to_maximum(self, path: LoadPath) -> int:
         """Load to the maximum of the cycle, nothing grows on the way; number of its corner."""
         analysis, top = self._analysis, 0
         if self._cycles.period is not None:
             found = []
-            for time, _ in self._corners:
-                self._load_to(path, time)
+            for corner in self._corners:
+                self._load_to(path, corner.time)
                 found.append(analysis.largest)
             top = int(np.argmax(found))
             self._begin_at(top)
-        self._load_to(path, self._corners[0][0])
+        self._load_to(path, self._corners[0].time)
         for g, v in analysis.at_tips():
             analysis.fatigue.register_front(g.p, v.tips.node, g.front.surface.n_nodes)
         return top
@@ -200,102 +176,14 @@ class _Cycling:
         self._corners = self._corners[top:] + self._corners[:top]
 
     def _load_to(self, path: LoadPath, time: float) -> None:
-        path.over_increment(time)
+        load_to(self._analysis, path, time)
         self._analysis.evaluate_tips()
+
+    # -- one cycle -----------------------------------------------------------------------
 
     def _stabilised_cycle(self) -> list[TipCycle]:
         """What the cycle does at the tips of each interface; the state stays at the maximum."""
-        system = self._analysis.condensed.system
-        ends = [loads for _, loads in self._corners[1:]]
-        if len(ends) > 1 or system.friction is not None:
-            ends.append(self._corners[0][1])
-        saved = self._analysis.condensed.interface_state()
-        corners, largest = self._once(self._instant(self._analysis.solver.state), ends)
-        if system.friction is not None:
-            # slips settle over some cycles
-            for _ in range(_SETTLING):
-                before = largest
-                corners, largest = self._once(corners[-1], ends)
-                if np.all(np.abs(largest - before) <= self._cycles.change * largest):
-                    break
-            else:
-                N = self._analysis.fatigue.N
-                log.warn("friction does not settle in the cycle at N = %g", N)
-        way = corners[:1]
-        for a, b in pairwise(corners):
-            way += self._between(a, b, largest, _HALVINGS)
-        self._analysis.condensed.restore_interfaces(saved)
-        return self._extremes(way)
-
-    def _once(self, start: _Instant, ends: list[Array]) -> tuple[list[_Instant], Array]:
-        """Instants of one cycle and the largest rate at each tip."""
-        corners = [start]
-        for loads in ends:
-            corners += self._way_to(corners[-1].state, loads)
-        return corners, np.stack([self._totals(c.measured) for c in corners]).max(axis=0)
-
-    def _instant(self, state: Equilibrium, *, straight: bool = False) -> _Instant:
-        time, none = self._analysis.time, np.zeros((0, 0))
-        measured = [
-            g.evaluator.measure(v.tips, state, time) if len(v.tips) else none
-            for g, v in self._analysis.at_tips()
-        ]
-        return _Instant(state, measured, self._analysis.condensed.system.closed.tobytes(), straight)
-
-    def _way_to(self, start: Equilibrium, loads: Array) -> list[_Instant]:
-        """Instants from an equilibrium (left out) to other loads."""
-        system = self._analysis.condensed.system
-        force = self._analysis.given_force(self._analysis.time)
-        if system.soft.bonds or system.friction is not None:
-            # friction, and cohesive bonds that an earlier step opened in part, depend on the path
-            path = system.pieces(start, loads, force)
-            return [self._instant(point, straight=True) for _, point in path]
-        return [self._instant(system.equilibrium(loads, force))]
-
-    def _between(self, a: _Instant, b: _Instant, largest: Array, halvings: int) -> list[_Instant]:
-        """Instants after a up to b between which G is a parabola, to the tolerance of the step."""
-        if b.follows(a):
-            return [b]
-        (middle,) = self._way_to(a.state, 0.5 * (a.state.loads + b.state.loads))
-        found = self._totals(middle.measured)
-        guess = self._totals([0.5 * (x + y) for x, y in zip(a.measured, b.measured, strict=True)])
-        if np.all(np.abs(found - guess) <= self._cycles.change * np.maximum(largest, found)):
-            return [middle, b]
-        if not halvings:
-            N = self._analysis.fatigue.N
-            log.warn("contact changes too often in the cycle at N = %g to follow G", N)
-            return [middle, b]
-        first = self._between(a, middle, largest, halvings - 1)
-        return first + self._between(middle, b, largest, halvings - 1)
-
-    def _totals(self, measured: list[Array]) -> Array:
-        """Total rate at the tips of all interfaces, shape (n_tips,), force/length."""
-        sums = [np.zeros(0)]
-        for (g, v), values in zip(self._analysis.at_tips(), measured, strict=True):
-            if len(v.tips):
-                sums.append(total(cyclic_parts(g)[1].rates(v.tips, values)))
-        return np.concatenate(sums)
-
-    def _extremes(self, way: list[_Instant]) -> list[TipCycle]:
-        out: list[TipCycle] = []
-        for i, (g, v) in enumerate(self._analysis.at_tips()):
-            criterion, evaluator = cyclic_parts(g)
-            if not len(v.tips):
-                out.append(TipCycle(CycleRates(*np.zeros((5, 0))), np.zeros(0), np.zeros((0, 0))))
-                continue
-            pieces = [
-                rates_between(evaluator, v.tips, a.measured[i], b.measured[i])
-                for a, b in pairwise(way)
-            ]
-            rates, measured = (np.concatenate(parts) for parts in zip(*pieces, strict=True))
-            found = criterion.cycle(rates, evaluator.toughness[v.tips.node])
-            peak = measured[total(rates).argmax(axis=0), range(len(v.tips))]
-            law = criterion.growth_law
-            regime = law.regimes(found)
-            growth = np.where(regime == Regime.PARIS, law.growth(found), 0.0)
-            growth = np.where(regime == Regime.UNSTABLE, advance(v.tips), growth)
-            out.append(TipCycle(found, growth, peak))
-        return out
+        return self._cycle.stabilised(self._corners)
 
     # -- over the cycles to the next release ---------------------------------------------
 
@@ -441,7 +329,7 @@ class _Cycling:
     def _undoing(self) -> Callable[[], None]:
         """Remember the present state; the result returns to it."""
         analysis, solver = self._analysis, self._analysis.condensed
-        state, rebases = solver.interface_state(), solver.rebases
+        state, rebases = solver.remember(), solver.rebases
         balance = analysis.balance.copy()
         known = [(g, len(g.records), g.n_released) for g in analysis.active]
 
@@ -454,56 +342,3 @@ class _Cycling:
             analysis.update_tips()
 
         return undo
-
-
-@dataclass(frozen=True)
-class _Instant:
-    """One instant of the cycle.
-
-    Attributes:
-        state: Equilibrium.
-        measured: What evaluators measured per interface, linear between equilibria.
-        contact: Which nodes are in contact.
-        straight: Contact and bonds did not change since the instant before.
-    """
-
-    state: Equilibrium
-    measured: list[Array]
-    contact: bytes
-    straight: bool
-
-    def follows(self, before: _Instant) -> bool:
-        """Whether everything is linear between an earlier instant and this one."""
-        return self.straight or self.contact == before.contact
-
-
-def rates_between(evaluator: RateEvaluator, tips: Tips, a: Array, b: Array) -> tuple[Array, Array]:
-    """Energy release rates on a linear piece of the cycle, the extremes of their sum among them.
-
-    The sum is a parabola wherever no mode is clipped at zero. It is taken at five points and at
-    the vertices of the parabolas around the smallest and the largest of these.
-
-    Args:
-        evaluator: The criterion on its interface.
-        tips: Front nodes.
-        a: What it measured at the beginning of the piece, shape (n, m).
-        b: The same at the end.
-
-    Returns:
-        Rates by mode, shape (7, n, 3), force/length; what belongs to them, shape (7, n, m).
-    """
-    n = len(tips)
-    many = np.stack([(1.0 - x) * a + x * b for x in _GRID])
-    flat = many.reshape(-1, many.shape[2])
-    rates = [evaluator.rates(repeat_tips(tips, len(_GRID)), flat).reshape(len(_GRID), n, 3)]
-    measured = [many]
-    sums = total(rates[0])
-    for place in (sums.argmin(axis=0), sums.argmax(axis=0)):
-        i = np.clip(place, 1, len(_GRID) - 2)
-        left, middle, right = (np.take_along_axis(sums, i[None] + k, 0)[0] for k in (-1, 0, 1))
-        bend = left - 2.0 * middle + right
-        shift = np.divide(0.5 * (left - right), bend, out=np.zeros(n), where=bend != 0.0)
-        x = np.clip(_GRID[i] + _GRID[1] * shift, 0.0, 1.0)[:, None]
-        measured.append(((1.0 - x) * a + x * b)[None])
-        rates.append(evaluator.rates(tips, measured[-1][0])[None])
-    return np.concatenate(rates), np.concatenate(measured)

@@ -100,10 +100,29 @@ class Debond:
                 "release leaves behind the tip; use StepRelease() (and VCCT), or method='vcct' or "
                 "method='closure'"
             )
+        self._check_rigid(where)
+        # a rigid surface on which faces slip takes no shear: rates are those of mode I alone
+        waived = self.interface.mode_i_only and not self.criterion.allows_normal_only
         try:
-            self.criterion.check_bond(normal_only=self.interface.normal_only)
+            self.criterion.check_bond(normal_only=self.interface.normal_only and not waived)
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
+
+    def _check_rigid(self, where: str) -> None:
+        """Refuse criteria that a rigid master does not have."""
+        if not self.interface.is_rigid:
+            return
+        for criterion in (self.criterion, *self.watch):
+            if criterion.needs_free_faces:
+                raise InputError(
+                    f"{where}: method='domain' integrates over the bodies on both sides, and one "
+                    "side is a rigid surface; use method='vcct' or method='closure'"
+                )
+            if self.interface.symmetry and getattr(criterion, "symmetry", False):
+                raise InputError(
+                    f"{where}: the interface says symmetry=True already, and its openings are "
+                    f"those of the whole crack; leave symmetry out of {type(criterion).__name__}"
+                )
 
 
 def check_criterion(where: str, criterion: Criterion) -> None:

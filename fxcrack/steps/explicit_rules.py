@@ -40,17 +40,41 @@ def inertia_of(effects: Sequence[Any]) -> Inertia:
     return effect
 
 
-def check_bodies(continuum: Continuum, loads: Sequence[Any]) -> None:
+def _check_shells(shell: ShellBodies, interfaces: Sequence[Interface]) -> None:
+    """Refuse what couples the masses of shells at different nodes.
+
+    Raises:
+        InputError: Says what, and what to do instead.
+    """
+    instead = "use a Dynamic step, or ContinuumShell on hexahedra of first order"
+    if shell.order == 1 and interfaces:
+        raise InputError(
+            f"Explicit: interface '{interfaces[0].title}' bonds faces of shells on surface meshes, "
+            "whose displacement and director share one inertia at the face, which explicit "
+            f"dynamics does not have; {instead}"
+        )
+    if shell.order == 1 and len(shell.layout.joints.nodes):
+        raise InputError(
+            "Explicit: the surface has kinks or T joints, where nodes of several parts move "
+            f"together, which explicit dynamics of shells does not have; {instead}"
+        )
+
+
+def check_bodies(
+    continuum: Continuum, loads: Sequence[Any], interfaces: Sequence[Interface]
+) -> None:
     """Refuse bodies and loads that explicit dynamics does not have.
+
+    Args:
+        continuum: The bodies.
+        loads: Their force patterns.
+        interfaces: Their interfaces.
 
     Raises:
         InputError: Says which, and what to do instead.
     """
     if isinstance(continuum, ShellBodies):
-        raise InputError(
-            "Explicit: shells on surface meshes have no lumped masses for explicit dynamics; use a "
-            "Dynamic step, or ContinuumShell on hexahedra of first order"
-        )
+        _check_shells(continuum, interfaces)
     if continuum.layout.shared:
         raise InputError(
             "Explicit: the strain out of the plane in GeneralisedPlaneStrain has no mass that "
@@ -138,6 +162,12 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 "release=StepRelease(), or use viscosity=0: a progressive release needs none"
             )
     for interface in (*[d.interface for d in debonds], *bonds):
+        if interface.is_rigid:
+            raise InputError(
+                f"interface '{interface.title}': explicit dynamics has no rigid surfaces; hold the "
+                "nodes by Displacement where they stay bonded, model the other body, or use a "
+                "Dynamic step"
+            )
         if interface.normal_only:
             raise InputError(
                 f"interface '{interface.title}': bonds of explicit dynamics hold in all "

@@ -37,7 +37,8 @@ def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequenc
             "Explicit: this scene has run other steps before, from which explicit dynamics cannot "
             "go on; make another scene for it, scene.rebuilt()"
         )
-    check_bodies(analysis.continuum, old.loads)
+    interfaces = [pair.interface for pair in analysis.pairs]
+    check_bodies(analysis.continuum, old.loads, interfaces)
     check_constraints(old.supports.constraints)
     found = terms(analysis.continuum)
     heat: list[Any] = []

@@ -1,0 +1,169 @@
+"""Pairing slave nodes with a rigid surface: gaps and normals from its formula, no master nodes.
+
+The jump of a node is its displacement, so that nothing but gap and frame depends on where the
+surface is. A plane has the same normal everywhere: its pairing holds for any displacement. On
+curved surfaces normal and gap are those of the point below the node at the start, and with finite
+strain those below its present position x,
+
+    n . u + g = phi(x),    g = n . (X - foot),    foot = x - phi(x) n
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.checks import format_point
+from fxcrack.base.errors import InterfaceError
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.kinematics import Axisymmetric
+from fxcrack.interface.frames import local_frames
+from fxcrack.interface.pair import Pair
+from fxcrack.interface.rigid import RigidSurface
+from fxcrack.interface.surface import FacetSurface, facet_element
+
+_FACING = -0.5
+"""Cosine between the outward normal of a slave node and the normal of the surface, at most."""
+_TURNED = 0.01
+"""Angle by which the normal below a node turns before it is paired anew."""
+_NEAR = 0.5
+"""Parts of a facet within which a gap may close in the next increment."""
+
+
+def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
+    """Refuse a plane of symmetry that is none.
+
+    Args:
+        where: Beginning of the message.
+        surface: The rigid surface.
+        model: Model of the bodies.
+
+    Raises:
+        InterfaceError: Bodies of revolution are not mirrored by it.
+    """
+    _, normals = surface.measure(np.zeros((1, 3)))
+    if isinstance(model, Axisymmetric) and abs(normals[0, 0]) > 1e-9:
+        raise InterfaceError(
+            f"{where}: {surface} is no plane of symmetry of bodies of revolution; its normal must "
+            "be the axis, (0, 1) or (0, -1), or leave symmetry out"
+        )
+
+
+def _facing(surface: FacetSurface, normals: Array) -> Array:
+    """Least cosine between a rigid surface's normal at a node and those of the facets around it.
+
+    Args:
+        surface: Slave surface.
+        normals: Normals of the rigid surface at its nodes, shape (n_nodes, 3).
+
+    Returns:
+        Shape (n_nodes,): -1 where a facet lies flat on the rigid surface, be it beside a facet that
+        stands upright on the same edge; 1 where there is no facet.
+    """
+    points = np.asarray(facet_element(surface.kind, surface.order).points)
+    unit, _ = surface.facet_normals(points)
+    out = np.ones(surface.n_nodes)
+    np.minimum.at(out, surface.facets, np.einsum("fmc,fmc->fm", unit, normals[surface.facets]))
+    return out
+
+
+def find_partners(
+    surface: RigidSurface,
+    slave: FacetSurface,
+    bonded: Bools,
+    tolerance: float,
+    where: str,
+    continuum: Continuum,
+) -> tuple[Bools, Array, Array]:
+    """Slave nodes that lie on a rigid surface, with normals and gaps there.
+
+    Args:
+        surface: The rigid surface.
+        slave: Slave surface.
+        bonded: Its bonded nodes, shape (n_nodes,).
+        tolerance: Largest distance of a node that is paired, length.
+        where: Beginning of messages.
+        continuum: The bodies.
+
+    Returns:
+        Whether nodes are paired, shape (n_nodes,); unit normals, shape (n_nodes, 3); gaps, shape
+        (n_nodes,), length.
+
+    Raises:
+        InterfaceError: A bonded node is away from the surface, or the body is on its other side.
+    """
+    surface.check_model(where, continuum.model, continuum.gdim)
+    gap, normals = surface.measure(slave.x)
+    near = np.abs(gap) <= tolerance
+    facing = _facing(slave, normals)
+    there = bonded & near if np.any(bonded & near) else near
+    behind = there & (facing > -_FACING)
+    if np.any(behind) and 2 * int(behind.sum()) >= int(there.sum()):
+        side = "reverse its normal" if surface.flat else "exchange inside=True and False"
+        i = int(np.argmax(behind))
+        raise InterfaceError(
+            f"{where}: the body is on the wrong side of the {surface}: at "
+            f"{format_point(slave.x[i])} the outward normal of '{slave.name}' is "
+            f"{format_point(slave.normals[i])}, and that of the rigid surface, "
+            f"{format_point(normals[i])}, must be opposite; {side}, or name the surface of the "
+            "body that faces it"
+        )
+    paired = near & (facing < _FACING)
+    lost = bonded & ~paired
+    if np.any(lost):
+        far = np.where(lost, np.abs(gap), -1.0)
+        i = int(np.argmax(far))
+        why = (
+            f"the farthest at {format_point(slave.x[i])} by {abs(gap[i]):.3g} (search tolerance "
+            f"{tolerance:.3g})"
+            if far[i] > tolerance
+            else f"one of them at {format_point(slave.x[i])}, where the two do not face each other"
+        )
+        raise InterfaceError(
+            f"{where}: {int(lost.sum())} bonded slave nodes do not lie on the {surface}, {why}; "
+            "move the surface to them, take them out of the bonded set, or raise "
+            "Interface(tolerance=...)"
+        )
+    through = ~paired & (gap < -tolerance) & (facing < _FACING)
+    if np.any(through):
+        i = int(np.argmin(np.where(through, gap, np.inf)))
+        raise InterfaceError(
+            f"{where}: {int(through.sum())} slave nodes lie behind the {surface}, the farthest at "
+            f"{format_point(slave.x[i])} by {-gap[i]:.3g} (search tolerance {tolerance:.3g}); move "
+            "the surface, or name a slave surface that lies in front of it"
+        )
+    return paired, normals, gap
+
+
+def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
+    """A pair with normals and gaps of its open nodes where they are now.
+
+    Args:
+        pair: The pair as it is, with a rigid master.
+        bonded: Slave nodes that are bonded now, or whose bonds still pull, shape (n_nodes,).
+        u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
+
+    Returns:
+        ``None`` if no gap that may close has changed enough to matter.
+    """
+    surface = pair.rigid
+    assert surface is not None
+    gdim = u_slave.shape[1]
+    x = pair.surface.x.copy()
+    x[:, :gdim] += u_slave
+    distance, normals = surface.measure(x)
+    facing = _facing(pair.whole_surface.moved(x), normals) < _FACING
+    over = ~bonded & (pair.paired | facing)
+    near = over & (distance < _NEAR * pair.surface.facet_size)
+    turned = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _TURNED
+    if not np.any(near & (turned | ~pair.paired)):
+        return None
+    if surface.flat:
+        over &= ~pair.paired  # the gaps of all others are as they were
+    frames, gaps = pair.frames.copy(), pair.gap.copy()
+    frames[over] = local_frames(normals, gdim)[over]
+    foot = x - distance[:, None] * normals
+    gaps[over] = np.einsum("nc,nc->n", pair.surface.x - foot, normals)[over]
+    return replace(pair, paired=pair.paired | over, frames=frames, gap=gaps)
