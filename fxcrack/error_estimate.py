@@ -239,10 +239,12 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
     # of an unknown power the smallest is assumed: it makes the error of the load the largest
     degree = min((d.criterion.degree or 1.0 for d in grow), default=1.0)
     rates = all(d.criterion.knows_toughness for d in grow)
+    simplices = analysis.continuum.mesh.domain.topology.cell_name() in _SIMPLICES
     domain: float | None = None
     jumps: float | None = None
-    if order == 2 and not isinstance(step, Cycles):
-        domain, jumps, size = _beside_domain_integral(scene, step, grow, name)
+    # of nonlinear triangles and tetrahedra neither order nor jumps tell the stiffness
+    if order == 2 and not isinstance(step, Cycles) and (analysis.linear or not simplices):
+        domain, jumps, size = _beside_domain_integral(scene, step, grow, name, simplices=simplices)
         if domain is not None and jumps is not None:
             return Estimate(
                 load=jumps + (1.0 + domain) ** (1.0 / degree) - 1.0,
@@ -293,14 +295,14 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
         size=size,
         difference=max(load, rate),
         interface=name,
-        simplices=_has_simplices(analysis),
+        simplices=simplices,
         domain=domain,
         seconds=_since(analysis, start),
     )
 
 
 def _beside_domain_integral(
-    scene: Rerunnable, step: Static, grow: Sequence[Debond], name: str
+    scene: Rerunnable, step: Static, grow: Sequence[Debond], name: str, *, simplices: bool
 ) -> tuple[float | None, float | None, float]:
     """Another run to the first onset with the domain integral beside the criterion; collective.
 
@@ -309,6 +311,7 @@ def _beside_domain_integral(
         step: The step it ran.
         grow: Debonds that were allowed to grow.
         name: Interface that is to grow first.
+        simplices: Whether the cells are triangles or tetrahedra.
 
     Returns:
         Relative difference of G at the first onset, ``None`` where there is no energy release rate
@@ -337,7 +340,7 @@ def _beside_domain_integral(
             twin.run(short, grow=again, progress=False)
             row, _, _ = _first(twin.analysis.history, again, cycles=False)
             size = _size(twin.analysis, name)
-            if _has_simplices(analysis) and analysis.linear:
+            if simplices:
                 u = twin.analysis.condensed.displacement()
                 jumps = part_of_jumps(twin.analysis.continuum, u.array_r.copy())
                 u.destroy()
@@ -351,10 +354,6 @@ def _beside_domain_integral(
     if not (own > 0.0 and beside > 0.0):
         return None, None, 0.0
     return abs(own / beside - 1.0), jumps, size
-
-
-def _has_simplices(analysis: Analysis) -> bool:
-    return analysis.continuum.mesh.domain.topology.cell_name() in _SIMPLICES
 
 
 def _stepping(history: History, name: str, degree: float, excess: float) -> float:

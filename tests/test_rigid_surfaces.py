@@ -153,11 +153,16 @@ STEPS = {
         {"maximum": 0.08, "ratio": 0.1, "n_max": 1e6},
         {"criterion": fx.Fatigue(GIc=0.2, paris=fx.Paris(0.0, -1.0, 1e-2, 2.0))},
     ),
+    "cycles, partial": (
+        fx.Cycles,
+        {"maximum": 0.08, "ratio": 0.1, "n_max": 1e6},
+        {"criterion": fx.Fatigue(GIc=0.2, paris=fx.Paris(0.0, -1.0, 1e-2, 2.0), partial=True)},
+    ),
 }
 
 
 @pytest.mark.mpi
-@pytest.mark.quick("path", "cycles")
+@pytest.mark.quick("path", "cycles", "cycles, partial")
 @pytest.mark.parametrize("way", STEPS)
 def test_half_of_a_dcb_in_every_step(comm: MPI.Intracomm, way: str) -> None:
     kind, asked, options = STEPS[way]
@@ -519,6 +524,8 @@ def test_criteria_that_a_rigid_master_does_not_have() -> None:
     half = fx.Interface("a", PLANE, symmetry=True)
     with pytest.raises(InputError, match="one side is a rigid surface"):
         fx.Debond(half, fx.VCCT(GIc=1.0, method="domain"))
+    with pytest.raises(InputError, match="mode_length"):
+        fx.Debond(half, fx.CriticalStress(1.0, distance=1.0), watch=[fx.VCCT(1.0, mode_length=1.0)])
     with pytest.raises(InputError, match="says symmetry=True already"):
         fx.Debond(half, fx.CrackOpening(1.0, distance=1.0, symmetry=True))
     assert half.normal_only

@@ -1,4 +1,4 @@
-"""Bonds that yield: springs in linear statics, and those of the arms of shells.
+"""Compliant bonds: springs in linear statics, and those of the arms of shells.
 
 References: an adhesive layer of solid cells, beams on an elastic foundation, and fine 27-node
 solids for the modes of bending specimens.
@@ -223,3 +223,19 @@ def test_what_is_refused(comm: MPI.Intracomm) -> None:
         glued.rebuilt(options=fx.CondensedOptions(method="iterative"))
     with pytest.raises(fx.InputError, match="linear bodies"):
         glued.rebuilt(effects=[fx.FiniteStrain()]).run(FAST, progress=False)
+
+
+def test_closure_beside_compliant_bonds_warns(
+    comm: MPI.Intracomm, caplog: pytest.LogCaptureFixture
+) -> None:
+    """One node of a front is not its row: 5 % less G than by VCCT in the same state."""
+    scene = slb(comm, (1.5, 1.5), 2.0)
+    (debond,) = scene.debonds
+    closure = fx.Debond(debond.interface, fx.VCCT(GIc=1.0, method="closure"))
+    twin = scene.rebuilt(debonds=[closure])
+    twin.run(FAST, progress=False)
+    assert 0.9 < mean_rates(twin).sum() / mean_rates(scene).sum() < 0.97
+    if comm.rank == 0:
+        assert "take method='vcct'" in caplog.text
+    scene.close()
+    twin.close()

@@ -113,7 +113,7 @@ class Matrices:
     def destroy(self) -> None:
         """Free matrices; collective."""
         self.matrix.destroy()
-        self.coordinates.transform.destroy()
+        self.coordinates.destroy()
 
 
 class Refactor:

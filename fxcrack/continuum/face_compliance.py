@@ -1,4 +1,4 @@
-"""How far the face of a shell yields under a traction on it, beyond what the shell itself does.
+"""Compliance of the face of a shell to a traction on it, beyond that of the shell itself.
 
 A traction on the face of a plate of height h raises stresses across and along it that vary over the
 height z = h x, 0 at the free face and 1 at the loaded one, as (Reissner 1945)

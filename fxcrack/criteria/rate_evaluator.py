@@ -87,6 +87,8 @@ class RateEvaluator(SofteningEvaluator):
                 "StepRelease",
                 probe.pair.title,
             )
+        if criterion.method == "closure" and surface.dim == 2:
+            _warn_of_rows(probe)
         x = surface.x[:, : probe.gdim]
         self._temperature = temperature
         self._moving = temperature is not None and not temperature.steady
@@ -319,6 +321,17 @@ class RateEvaluator(SofteningEvaluator):
     def breaks(self) -> tuple[float, ...]:
         """Rates do not depend on time as such; a temperature does."""
         return self._temperature.breaks() if self._temperature is not None else ()
+
+
+def _warn_of_rows(probe: FrontProbe) -> None:
+    """Warn where releasing one node of a front says little of releasing its row."""
+    if probe.pair.interface.stiffness is not None:
+        log.warn(
+            "interface '%s': method='closure' releases one node of a front while the compliant "
+            "bonds beside it hold, so that G is too small (by 5 %% in single leg bending, with a "
+            "mode II fraction of 0.43 instead of 0.37); take method='vcct'",
+            probe.pair.title,
+        )
 
 
 _NO_MODE = 1e-11

@@ -9,7 +9,7 @@ import numpy as np
 from fxcrack.base.arrays import Ints
 from fxcrack.deck.cards import Card, Row, label
 from fxcrack.deck.flat import Flat
-from fxcrack.interface.pairing import Interface
+from fxcrack.interface.definition import Interface
 
 
 @dataclass(eq=False)

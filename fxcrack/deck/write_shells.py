@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.laminate import Laminate
@@ -91,7 +91,7 @@ class Stacks:
         rotation: Row of :data:`ROTATIONS` that each cell is written with, shape (n_cells,).
     """
 
-    stacked: Ints
+    stacked: Bools
     rotation: Ints
 
 

@@ -1,4 +1,4 @@
-"""Bonds of linear bodies that yield: springs between slave nodes and their masters.
+"""Compliant bonds of linear bodies: springs between slave nodes and their masters.
 
 A bond with a stiffness lies in series with the crack: the jump of a slave node is
 

@@ -70,9 +70,9 @@ class Interface:
         gap: "adjust" counts small initial gaps as zero, "keep" starts contact from them.
         stiffness: Of bonds, force/length^3: normal, along the growth direction and along the front.
             In ``Explicit`` also "auto": that of the cells beside them. Between shells of linear
-            bodies also "arms": what the faces of the arms yield beside the motion of their
-            reference surfaces (:mod:`fxcrack.continuum.face_compliance`), so that the root of a
-            crack turns and slides as that of solids. ``None``: bonds are exact, which costs
+            bodies also "arms": the compliance of the faces of the arms beside the motion of
+            their reference surfaces (:mod:`fxcrack.continuum.face_compliance`), so that the root of
+            a crack turns and slides as that of solids. ``None``: bonds are exact, which costs
             nothing; in ``Explicit`` a stiffness shortens the increment and lowers G.
         strict: Nodes of the bonded group that are no slave nodes are an error; they are warned of
             and ignored otherwise.

@@ -221,9 +221,9 @@ def build_coordinates(
         own[constrained] = False
     follows = joined  # other dofs, by T
     free_jump = np.zeros_like(follows)
-    for link, role, yields in zip(links, roles, elastic, strict=True):
+    for link, role, sprung in zip(links, roles, elastic, strict=True):
         follows[link.nodes, :gdim] = True
-        free_jump[link.nodes, :gdim] = ((role == FREE) | yields)[link.slaves]
+        free_jump[link.nodes, :gdim] = ((role == FREE) | sprung)[link.slaves]
     shared = SharedUnknowns(layout, supports)
     shared.keep_one(own)
     local = layout.dofs(nodes.local)
@@ -309,13 +309,13 @@ def _springs(
         column: Column of each owned dof's own, shape (n_local,).
     """
     out = []
-    for link, frame, stiffness, yields in zip(links, frames, springs, elastic, strict=True):
+    for link, frame, stiffness, sprung in zip(links, frames, springs, elastic, strict=True):
         if stiffness is None:
             continue
         dofs = nodes.nodes[link.nodes]
         k = link.slaves[layout.is_owned(dofs)]
         local = layout.dofs(layout.to_local(dofs[layout.is_owned(dofs)]))[:, : layout.gdim]
-        own = np.where(yields[k], column[local], -1)
+        own = np.where(sprung[k], column[local], -1)
         out.append(assembled_springs(stiffness[k], frame[k], own))
     return tuple(out)
 

@@ -88,14 +88,15 @@ class LinearSolver(InterfaceSolver):
                 "CondensedOptions(method='iterative') is not possible in generalised plane strain, "
                 "whose strain out of the plane links all nodes; leave method out"
             )
-        yielding = [p.title for p in pairs if p.interface.stiffness is not None]
-        if options.method == "iterative" and yielding:
+        compliant = [p.title for p in pairs if p.interface.stiffness is not None]
+        if options.method == "iterative" and compliant:
             raise InputError(
-                f"CondensedOptions(method='iterative'): interface '{yielding[0]}' has bonds with a "
-                "stiffness of their own, which need a factorisation; leave method or stiffness out"
+                f"CondensedOptions(method='iterative'): interface '{compliant[0]}' has bonds with "
+                "a stiffness of their own, which need a factorisation; leave method or stiffness "
+                "out"
             )
         if options.method == "iterative" or (
-            options.method == "auto" and not yielding and self._too_large()
+            options.method == "auto" and not compliant and self._too_large()
         ):
             self._cost = ColumnCost.guess(continuum.n_global)
             self.columns = SchurColumnCache(

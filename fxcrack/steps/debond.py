@@ -118,6 +118,11 @@ class Debond:
                     f"{where}: method='domain' integrates over the bodies on both sides, and one "
                     "side is a rigid surface; use method='vcct' or method='closure'"
                 )
+            if getattr(criterion, "mode_length", None) is not None:
+                raise InputError(
+                    f"{where}: mode_length divides modes by the crack-tip fields of the bodies on "
+                    "both sides, and one side is a rigid surface; leave it out"
+                )
             if self.interface.symmetry and getattr(criterion, "symmetry", False):
                 raise InputError(
                     f"{where}: the interface says symmetry=True already, and its openings are "

@@ -176,7 +176,8 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
         if interface.stiffness == "arms":
             raise InputError(
                 f"interface '{interface.title}': stiffness='arms' is that of shells on surface "
-                "meshes, which Explicit does not have; give 'auto' or three numbers per area"
+                "meshes, whose interfaces Explicit does not have; give 'auto' or three numbers per "
+                "area"
             )
         if interface.pairing == "surface-to-surface":
             raise InputError(

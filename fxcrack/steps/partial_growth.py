@@ -311,11 +311,13 @@ class PartialGrowth:
 def ligament_bonds(analysis: Analysis, g: Crack) -> list[CohesiveBond]:
     """What is left of the bonds of a crack in elements that its front has passed in part."""
     ligaments, index = analysis.fatigue.ligaments[g.p], analysis.condensed.index[g.p]
+    # k belongs to openings of the whole crack, bonds to jumps of their nodes
+    factor = g.debond.interface.opening_factor
     bonds = []
     for node in np.flatnonzero(ligaments.part > 0.0):
         part = float(ligaments.part[node])
         for local in range(index.shape[1]):
-            stiffness = float(ligaments.stiffness[node, min(local, 1)])
+            stiffness = factor * float(ligaments.stiffness[node, min(local, 1)])
             if index[node, local] < 0 or not np.isfinite(stiffness):
                 continue
             bonds.append(

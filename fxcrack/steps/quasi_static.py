@@ -257,7 +257,7 @@ def _curves_have_ended(driver: StepDriver) -> bool:
 
 
 def _never(driver: StepDriver) -> str:
-    """Why the load was raised in vain."""
+    """Why raising the load made nothing grow."""
     analysis, breaks = driver.analysis, driver.breaks
     left = sum(int(g.front.bonded.sum()) for g in analysis.active)
     tips = sum(len(v.tips) for _, v in analysis.at_tips())

@@ -14,7 +14,7 @@ from fxcrack.steps.analysis import Analysis
 
 _WORDS = {
     "trials": "trials",
-    "failures": "of them in vain",
+    "failures": "failed trials",
     "iterations": "iterations",
     "factorisations": "factorisations",
     "contact": "changes of contact",
@@ -25,7 +25,7 @@ _WORDS = {
 
 
 class SolverWork:
-    """Observer of a step that logs what each row has cost; collective, rank 0 writes.
+    """Observer of a step that logs what each row has cost, on rank 0.
 
     Args:
         analysis: The analysis.
