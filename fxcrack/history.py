@@ -181,7 +181,8 @@ class History:
         if not chosen:
             events = list(dict.fromkeys(str(r["event"]) for r in self.rows))
             unknown_name("row of event", str(event), events)
-        most = max((r[column] for r in chosen if column in r), default="none")
+        reached = [float(r[column]) for r in chosen if column in r]
+        most = f"{max(reached):.9g}" if reached else "none"
         hint = ""
         if above is not None:
             hint = (

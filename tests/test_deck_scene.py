@@ -514,6 +514,9 @@ def test_monitors_of_history_output(tmp_path):
     text = PLATE + "*BOUNDARY\nLEFT, PINNED\n" + stepped("*CLOAD", "6, 2, 1.", *cards)
     titles = [m.title for m in arguments(tmp_path, text)["monitors"]]
     assert titles == ["U2 RIGHT", "U1 LEFT", "U2 LEFT"]
+    report = read(tmp_path, text.replace("*NODE PRINT, NSET=LEFT\nU\n", "*NODE PRINT\nRF\n")).report
+    assert report.read[-2].startswith("column of the history: m[U2 RIGHT]")
+    assert "*NODE OUTPUT" not in report.ignored and report.ignored["*NODE PRINT"] == 1
 
 
 # -- whole scenes ----------------------------------------------------------------------------------

@@ -41,8 +41,8 @@ def test_crack_length_by_name() -> None:
     [
         ([], "free to move along x and y, and free to turn"),
         ([fx.Displacement("pin_top", y=1.0)], "free to move along x, and free to turn"),
-        ([fx.Displacement("pin_top", x=0.0, y=1.0)], "leave the whole free to turn"),
-        ([fx.Displacement("top", y=1.0)], r"leave the whole free to move along x\)"),
+        ([fx.Displacement("pin_top", x=0.0, y=1.0)], "leave the whole model free to turn"),
+        ([fx.Displacement("top", y=1.0)], r"leave the whole model free to move along x\)"),
     ],
 )
 def test_forgotten_support(comm: MPI.Comm, supports: list[fx.Displacement], words: str) -> None:

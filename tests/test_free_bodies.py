@@ -197,8 +197,32 @@ def test_free_bodies_are_named(
 
 def test_a_solid_that_is_bonded_along_a_line_turns_about_it(comm: MPI.Intracomm) -> None:
     hold = [fx.Displacement("under0", x=0.0, y=0.0, z=0.0)]
-    with pytest.raises(fx.FxcrackError, match="leave body 'b1' free to turn"):
+    words = r"leave body 'b1' free to turn about an axis along \(0, 0, 1\)\)"
+    with pytest.raises(fx.FxcrackError, match=words):
         run(comm, stack(comm, 2, True), supports=hold, bonds=bonds(2, line))
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+@pytest.mark.parametrize(
+    ("end", "axis"),
+    [((0.0, 4.0, 0.0), r"\(0, 1, 0\)"), ((3.0, 4.0, 0.0), r"\(0.6, 0.8, 0\)")],
+)
+def test_the_axis_about_which_a_solid_turns_is_named(
+    comm: MPI.Intracomm, end: tuple[float, float, float], axis: str
+) -> None:
+    def make() -> Blocks:
+        model = Blocks()
+        x = [np.linspace(0.0, 3.0, 4), np.linspace(0.0, 4.0, 3), np.array([0.0, 1.0])]
+        block = model.add("block", x, "hexahedron", 1)
+        for name, place in (("one", (0.0, 0.0, 0.0)), ("other", end)):
+            model.group(name, block.part(**dict(zip("xyz", place, strict=True))))
+        return model
+
+    hold = [fx.Displacement(name, x=0.0, y=0.0, z=0.0) for name in ("one", "other")]
+    words = rf"leave the whole model free to turn about an axis along {axis}\)"
+    with pytest.raises(fx.FxcrackError, match=words):
+        run(comm, build(comm, "block", make), supports=hold)
 
 
 def test_bonds_in_the_normal_direction_let_a_body_slide(comm: MPI.Intracomm) -> None:

@@ -520,6 +520,17 @@ def test_contradictions_of_an_interface(options: dict[str, Any], words: str) -> 
         fx.Interface("a", **options)
 
 
+@pytest.mark.parametrize("curvature", [None, 1e-3])
+def test_no_curvature_across_a_plane_of_symmetry(curvature: float | None) -> None:
+    """A half that is free to bend about its own middle is not half of the whole."""
+    bond = fx.Interface("upper_face", PLANE, lambda x: x[0] >= 10.0, symmetry=True)
+    made = {"materials": STEEL, "debonds": [fx.Debond(bond, fx.VCCT(GIc=1.0))]}
+    mesh = half_dcb(MPI.COMM_SELF, length=24.0, height=1.5, dx=2.0, ny=1)
+    with pytest.raises(InterfaceError, match="does not allow curvature_y"):
+        fx.Scene(mesh, model=fx.GeneralisedPlaneStrain(curvature_y=curvature), **made)
+    fx.Scene(mesh, model=fx.GeneralisedPlaneStrain(curvature_x=curvature), **made).close()
+
+
 def test_criteria_that_a_rigid_master_does_not_have() -> None:
     half = fx.Interface("a", PLANE, symmetry=True)
     with pytest.raises(InputError, match="one side is a rigid surface"):

@@ -124,7 +124,9 @@ def check_held(continuum: Continuum, supports: Supports, pairs: Sequence[Pair] =
     _, seen, vectors = np.linalg.svd(np.vstack([none, *triangles]), full_matrices=False)
     free = vectors[seen <= _UNSEEN * max(float(seen[0]), 1e-300)].T
     if free.shape[1]:
-        raise SolverError(f"{mumps_message(-10, 0)} (the supports leave the whole {ways(free)})")
+        raise SolverError(
+            f"{mumps_message(-10, 0)} (the supports leave the whole model {ways(free)})"
+        )
 
 
 def ways(free: Array) -> str:
@@ -137,8 +139,21 @@ def ways(free: Array) -> str:
     moves = [n for n, row in zip(names, free, strict=False) if row @ row > 1.0 - 1e-6]
     words = [f"free to move along {' and '.join(moves)}"] if moves else []
     if free.shape[1] > len(moves):
-        words.append("free to turn")
+        words.append("free to turn" + _about(free))
     return ", and ".join(words)
+
+
+def _about(free: Array) -> str:
+    """The direction of the axis, in words, where all turns of a body in space have one."""
+    if len(free) < 6:
+        return ""
+    # the turns of motions_of are about z, x and -y
+    axes, seen, _ = np.linalg.svd(free[[4, 5, 3]] * [[1.0], [-1.0], [1.0]])
+    if seen[0] < 1e-3 or (len(seen) > 1 and seen[1] > 1e-6):
+        return ""
+    axis = axes[:, 0]
+    axis *= np.sign(axis[np.flatnonzero(np.abs(axis) > 1e-3)[0]])
+    return f" about an axis along ({', '.join(f'{c + 0.0:g}' for c in np.round(axis, 3))})"
 
 
 def _least(a: Array, b: Array) -> Array:

@@ -35,12 +35,14 @@ class Sections:
 
     Attributes:
         materials: Material of each group of cells.
+        sets: Element sets of the section cards that give it, of each of these groups.
         model: Kinematic model with its thickness.
         zero: Temperature to which secant expansions tabulated against it refer, None without.
         rayleigh: Damping by mass and stiffness.
     """
 
     materials: dict[str, Material | Section]
+    sets: dict[str, list[str]]
     model: Model | Shell
     zero: float | None
     rayleigh: tuple[float, float]
@@ -74,6 +76,7 @@ class _Sections:
         owner = np.full(len(flat.cells), -1, dtype=np.int64)
         kinds: list[tuple[str | Card, Frame, float, Stress]] = []
         cards: list[tuple[Card, str]] = []
+        titles: list[list[str]] = []
         spaces: list[Space] = []
         for place, placed in flat.placed.items():
             for card in placed.space.sections:
@@ -83,14 +86,16 @@ class _Sections:
                 what = card if is_shell else self._known(card)
                 frame = self._frame(card, placed.space)
                 thickness = 1.0 if is_shell else self._thickness(card)
+                title = (f"{placed.space.name}." if place else "") + card.text("ELSET")
                 for stress, part in self._stresses.parts(cells):
                     kind = what, frame, thickness, stress
                     if kind not in kinds:
                         kinds.append(kind)
                         spaces.append(placed.space)
-                        prefix = f"{placed.space.name}." if place else ""
-                        cards.append((card, prefix + card.text("ELSET")))
+                        cards.append((card, title))
+                        titles.append([])
                     i = kinds.index(kind)
+                    titles[i].append(title)
                     both = part[(owner[part] >= 0) & (owner[part] != i)]
                     if len(both):
                         first = cards[int(owner[both[0]])][0]
@@ -115,8 +120,10 @@ class _Sections:
                 "the materials have different *DAMPING; all bodies must have the same"
             )
         materials: dict[str, Material | Section] = {}
+        sets: dict[str, list[str]] = {}
         for i in used:
             name = self._groups.cells(cards[i][1], np.flatnonzero(owner == i), words="elements")
+            sets[name] = titles[i]
             what, frame, _, stress = kinds[i]
             if isinstance(what, Card) and flat.kind.shell:
                 cells = np.flatnonzero(owner == i)
@@ -128,6 +135,7 @@ class _Sections:
                 materials[name] = self._stresses.of(made, stress)
         return Sections(
             materials,
+            sets,
             self._model(all_of.pop()),
             next(iter(self._zeros)) if len(self._zeros) == 1 else None,
             damping.pop(),

@@ -68,6 +68,12 @@ class Report:
                             f"available{near}; known: {', '.join(sorted(known.parameters)) or '-'}"
                         )
 
+    def answer(self, card: Card) -> None:
+        """Note that an output request is answered, so that it is not without effect."""
+        left = self.ignored.pop(card.title, 0) - 1
+        if left > 0:
+            self.ignored[card.title] = left
+
     def check(self) -> None:
         """Stop if something is refused.
 

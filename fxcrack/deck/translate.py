@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -175,7 +175,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         "loads": loads.loads(groups, densities),
         "debonds": debonds,
         "bonds": bonds,
-        "monitors": _monitors(model.steps, flat, groups),
+        "monitors": _monitors(model.steps, flat, groups, report),
         "effects": _effects(
             procedures,
             sections,
@@ -186,7 +186,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         + stresses.effects(procedures, report),
     }
     raw = groups.raw_mesh()
-    _tell(report, flat, arguments, steps)
+    _tell(report, flat, sections.sets, arguments, steps)
     nodes = {
         title: NodeNames(flat.points[found], flat.node_names(found))
         for title, found in contacts.slave_nodes().items()
@@ -333,7 +333,7 @@ def _effects(
     return effects
 
 
-def _monitors(steps: Sequence[Family], flat: Flat, groups: Groups) -> list[Monitor]:
+def _monitors(steps: Sequence[Family], flat: Flat, groups: Groups, report: Report) -> list[Monitor]:
     """Displacements that history output and printed tables ask for, as means over the set."""
     out: dict[str, Monitor] = {}
     for family in steps:
@@ -353,16 +353,24 @@ def _monitors(steps: Sequence[Family], flat: Flat, groups: Groups) -> list[Monit
             nodes = nodes[flat.used[nodes]]
             if not len(nodes):
                 continue
-            for i in range(flat.kind.gdim):
-                if words & {"U", f"U{i + 1}"}:
-                    title = f"U{i + 1} {label(name)}"
-                    direction = tuple(float(i == j) for j in range(flat.kind.gdim))
-                    where = groups.support(card, name, nodes)
-                    out.setdefault(key(title), Monitor(where, direction, title))
+            axes = [i for i in range(flat.kind.gdim) if words & {"U", f"U{i + 1}"}]
+            if axes:
+                report.answer(card)
+            for i in axes:
+                title = f"U{i + 1} {label(name)}"
+                direction = tuple(float(i == j) for j in range(flat.kind.gdim))
+                where = groups.support(card, name, nodes)
+                out.setdefault(key(title), Monitor(where, direction, title))
     return list(out.values())
 
 
-def _tell(report: Report, flat: Flat, arguments: dict[str, Any], steps: Sequence[DeckStep]) -> None:
+def _tell(
+    report: Report,
+    flat: Flat,
+    sets: Mapping[str, Sequence[str]],
+    arguments: dict[str, Any],
+    steps: Sequence[DeckStep],
+) -> None:
     """Say what was read."""
     kind = flat.kind
     report.read.append(
@@ -370,7 +378,9 @@ def _tell(report: Report, flat: Flat, arguments: dict[str, Any], steps: Sequence
         f"({kind.model}, {kind.cell} of order {kind.order})"
         + (f", {len(flat.parents)} nodes added to the elements" if len(flat.parents) else "")
     )
-    report.read += [f"material of '{n}': {m}" for n, m in arguments["materials"].items()]
+    for name, material in arguments["materials"].items():
+        of = ", ".join(f"'{title}'" for title in dict.fromkeys(sets[name]))
+        report.read.append(f"material of {of}: {material}")
     report.read.append(f"model: {arguments['model']}")
     report.read += [f"support: {s}" for s in arguments["supports"]]
     report.read += [f"load: {x}" for x in arguments["loads"]]
@@ -384,6 +394,7 @@ def _tell(report: Report, flat: Flat, arguments: dict[str, Any], steps: Sequence
     for interface in arguments["bonds"]:
         report.read.append(f"interface: slave '{interface.slave}', master '{interface.master}'")
     report.read += [f"effect: {e}" for e in arguments["effects"]]
+    report.read += [f"column of the history: m[{m.title}]" for m in arguments["monitors"]]
     for step in steps:
         if isinstance(step.step, Cycles):
             words = f"cycles of period {step.step.period}, {step.step.n_max:g} of them"

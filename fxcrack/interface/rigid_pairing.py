@@ -18,6 +18,7 @@ from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InterfaceError
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.interface.frames import local_frames
 from fxcrack.interface.pair import Pair
@@ -41,7 +42,7 @@ def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
         model: Model of the bodies.
 
     Raises:
-        InterfaceError: Bodies of revolution are not mirrored by it.
+        InterfaceError: Bodies of revolution, or strains out of the plane, are not mirrored by it.
     """
     _, normals = surface.measure(np.zeros((1, 3)))
     if isinstance(model, Axisymmetric) and abs(normals[0, 0]) > 1e-9:
@@ -49,6 +50,15 @@ def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
             f"{where}: {surface} is no plane of symmetry of bodies of revolution; its normal must "
             "be the axis, (0, 1) or (0, -1), or leave symmetry out"
         )
+    if isinstance(model, GeneralisedPlaneStrain):
+        # e_zz of the whole is even about the plane: it does not change along the normal
+        for axis, name in enumerate(("curvature_x", "curvature_y")):
+            if getattr(model, name) != 0.0 and abs(normals[0, axis]) > 1e-9:
+                raise InterfaceError(
+                    f"{where}: symmetry about {surface} does not allow {name} = "
+                    f"{getattr(model, name)}: the strain out of the plane is alike on both sides "
+                    f"of a plane of symmetry; give {name}=0.0 (the default), or model both halves"
+                )
 
 
 def _facing(surface: FacetSurface, normals: Array) -> Array:
