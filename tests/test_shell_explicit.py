@@ -11,6 +11,7 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.meshes.sheets import Sheet, sheets
+from fxcrack.output.fields import has_finite_bodies
 
 E, RHO, LENGTH, WIDTH = 70e3, 2.7e-9, 20.0, 2.0
 FIRST = 1.8751040687119611
@@ -58,10 +59,10 @@ def balanced(history: fx.History, tolerance: float = 1e-9) -> bool:
 def test_frequency_of_a_cantilever(comm: MPI.Intracomm, cell: str) -> None:
     """The end of a thin strip comes back after half a period of Euler and Bernoulli's beam.
 
-    The directors' inertia lowers the frequency by 0.25 % at this size of the cells, their lumped
+    The directors' inertia lowers the frequency by 0.4 % at this size of the cells, their lumped
     mass by as little; 1 % is what is asked for.
     """
-    height, n = 0.2, 20
+    height, n = 0.2, 16
     omega = (FIRST / LENGTH) ** 2 * np.sqrt(E * height**2 / (12.0 * RHO))
     scene = strip(comm, height, n, cell=cell, inertia={"velocity": (0.0, 0.0, bending_mode)})
     history = scene.run(fx.Explicit(until=fx.Time(3.4 / omega), rows=40), progress=False)
@@ -71,7 +72,7 @@ def test_frequency_of_a_cantilever(comm: MPI.Intracomm, cell: str) -> None:
     assert np.pi / omega / zero == pytest.approx(1.0, abs=0.01)
     assert balanced(history)
     part = history["mass_scaling_energy"].astype(float).max()
-    assert 0.0 < part < 0.02 * history["kinetic_energy"].astype(float).max()
+    assert 0.0 < part < 0.04 * history["kinetic_energy"].astype(float).max()
 
 
 @pytest.mark.mpi
@@ -116,6 +117,7 @@ def test_membrane_wave(comm: MPI.Intracomm) -> None:
 
 
 @pytest.mark.mpi
+@pytest.mark.three
 def test_histories_do_not_depend_on_ranks(comm: MPI.Intracomm) -> None:
     """Loads of all kinds on a strip whose end is turned: numbers of one rank on any number."""
     ramp = fx.SmoothStep((0.0, 2e-5), (0.0, 1.0))
@@ -160,10 +162,12 @@ def test_operators_scaled_mass_and_large_rotation(comm: MPI.Intracomm) -> None:
     step = fx.Explicit(until=fx.Time(1e-4), rows=4, dt=dt, mass_scale="dt")
     scaled = strip(comm, 0.2, 8, 0.3, **given).run(step, progress=False)
     assert scaled.details["stable_increment"] >= dt and balanced(scaled)
-    turning = strip(
+    scene = strip(
         comm, 0.2, 8, 0.3, effects=(fx.FiniteStrain(),),
         inertia={"velocity": (0.0, 0.0, lambda x: 4e4 * bending_mode(x))},
-    ).run(fx.Explicit(until=fx.Time(1e-4), rows=4), progress=False)  # fmt: skip
+    )  # fmt: skip
+    turning = scene.run(fx.Explicit(until=fx.Time(6e-5), rows=4), progress=False)
+    assert has_finite_bodies(scene.analysis)  # files show the stresses of large rotation
     assert np.abs(turning["m[w]"].astype(float)).max() > 0.1 * LENGTH
     assert balanced(turning, 1e-3)
 
@@ -221,19 +225,9 @@ def test_refusals(comm: MPI.Intracomm) -> None:
         explicit(strip(comm, 0.5, 4), bulk=(0.06, 1.2))
     alloy = fx.Section(fx.Isotropic(E, 0.3, density=RHO), thickness=1.0, axis=(0, 1, 0))
     x = np.linspace(0.0, 8.0, 5)
-    arms = [
-        Sheet("upper", x, [0.0, 2.0], lambda a, b: (a, b, 0.5 + 0.0 * a)),
-        Sheet("lower", x, [0.0, 2.0], lambda a, b: (a, b, -0.5 + 0.0 * a)),
-    ]
-    bond = fx.Interface(slave=fx.Face("lower", "top"), master=fx.Face("upper", "bottom"), name="b")
     given: dict[str, Any] = {
         "model": fx.Shell(), "materials": alloy, "effects": [fx.Inertia()],
     }  # fmt: skip
-    scene = fx.Scene(
-        sheets(arms, comm), supports=[fx.Clamp("upper_a0")], bonds=[bond], **given
-    )  # fmt: skip
-    with pytest.raises(fx.InputError, match=r"interface 'b' bonds faces of shells"):
-        explicit(scene)
     frame = [
         Sheet("flat", x, [0.0, 2.0]),
         Sheet("web", x, [0.0, 2.0], lambda a, b: (0.0 * a, b, a)),

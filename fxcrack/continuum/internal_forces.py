@@ -134,6 +134,8 @@ class InternalForces:
             temperature that changes in nonlinear bodies.
         choice: Which operator is used; set by :meth:`choose`.
         evaluations: How often forces were evaluated.
+        on_unknowns: Takes the stiffness of linear bodies to other unknowns that :attr:`u` holds;
+            ``None`` where it holds those of the nodes.
     """
 
     def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
@@ -147,6 +149,7 @@ class InternalForces:
         self._yields = any(t.path_dependent for t in terms)
         self.path_dependent = heated or self._yields
         self.evaluations = 0
+        self.on_unknowns: Callable[[PETSc.Mat], PETSc.Mat] | None = None
         self.choice = OperatorChoice("assembly", "nothing else was chosen", {})
         self._by_cells = [t for t in terms if t.by_cells]
         self._changing = [t for t in terms if not t.constant and _has_state(t)]
@@ -174,7 +177,9 @@ class InternalForces:
             "product": self._product,
             "assembly": self._assembled,
         }
-        if self.continuum.temperature is not None:
+        if self.on_unknowns is not None:
+            operator, why = "product", "faces of shells have unknowns of their own"
+        elif self.continuum.temperature is not None:
             operator, why = "product", "the temperature of linear bodies is a load"
         else:
             why = "it was asked for"
@@ -206,6 +211,8 @@ class InternalForces:
         """
         if self._matrix is None:
             matrix = self.continuum.stiffness()
+            if self.on_unknowns is not None:
+                matrix = self.on_unknowns(matrix)
             self._matrix, self._further = local_matrix(self.continuum, matrix)
             matrix.destroy()
         return self._matrix

@@ -103,6 +103,8 @@ def no_bulk_viscosity(flat: Flat, sections: Sections, *, finite: bool) -> str | 
     """
     if finite:
         return "steps with NLGEOM, which is on unless NLGEOM=NO is written"
+    if flat.kind.shell:
+        return "shells"
     if flat.kind.stacked:
         return "continuum shells"
     if any(isinstance(m, NeoHookean) for m in sections.materials.values()):

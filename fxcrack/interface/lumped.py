@@ -103,7 +103,7 @@ class LumpedInterface:
         self.nodes = nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=self.jumped)
         which, value = supports.at_nodes(nodes)
         self.which, self.value = which[:, :gdim], value[:, :gdim]
-        check_slaves(pairs, self.jumped, nodes, self.which, self.value, supports)
+        check_slaves(pairs, self.jumped, nodes, which, value, supports)
         self.mass = nodes.gather(mass)[:, 0] if len(nodes) else np.zeros(0)
         at_slaves = [
             np.where(j[:, None], self._support_of(p), -1)

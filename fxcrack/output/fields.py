@@ -77,7 +77,8 @@ def stress_function(source: Analysis | HasAnalysis, u: fem.Function, time: float
 
 def has_finite_bodies(analysis: Analysis) -> bool:
     """Whether the bodies of an analysis turn and stretch by any amount."""
-    return isinstance(analysis.solver, NewtonSolver) and analysis.solver.bodies.finite
+    solver = analysis.solver
+    return isinstance(solver, NewtonSolver | ExplicitSolver) and solver.bodies.finite
 
 
 # -- grids -----------------------------------------------------------------------------------------

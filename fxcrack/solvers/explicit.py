@@ -51,6 +51,7 @@ from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
 from fxcrack.solvers.explicit_moving import MovingInterfaces
 from fxcrack.solvers.explicit_outer import OuterForces
+from fxcrack.solvers.explicit_points import FacePoints
 from fxcrack.solvers.explicit_present import PresentInterface
 from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
 from fxcrack.solvers.explicit_stability import Stability
@@ -112,17 +113,22 @@ class ExplicitSolver:
         self.around = [(0.0, 0.0)] * len(pairs)
         following = [t for t in terms if isinstance(t, FollowerPressure)]
         self.bodies = InternalForces(continuum, [t for t in terms if t not in following])
+        self.mass = ScaledMass.of(continuum, effect)
+        self.points = points = FacePoints(continuum, pairs, self.mass.values)
+        self.supports = supports = points.supports(supports)
+        self.mass.take_points(points)
+        if points.exist:
+            self.bodies.on_unknowns = points.stiffness
         self._effect = effect
         self.further = FurtherForces(continuum, following, self.bodies.u)
-        self.mass = ScaledMass.of(continuum, effect)
-        self._velocity = starting_velocity(continuum, effect.velocity)
+        self._velocity = points.motion(starting_velocity(continuum, effect.velocity))
         self._velocity_whole = True  # at interface nodes as well
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
         self.energies = MotionEnergies(self.comm)
         self.monitored: list[float] = []
-        self._patterns = LoadsAndMonitors(continuum, loads, monitors)
+        self._patterns = LoadsAndMonitors(continuum, loads, monitors, points)
         self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass.values)
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
@@ -155,13 +161,14 @@ class ExplicitSolver:
         self.dynamics = dynamics_of(lumped, self.pairs, self.fronts, self.continuum)
         self._moving = MovingInterfaces(self.dynamics, self.pairs, self.fronts)
         self._mine = nodes.mine
-        self._at_interface = (gdim * nodes.local[:, None] + np.arange(gdim)).ravel()
+        layout = self.continuum.layout
+        self._at_interface = layout.dof(nodes.local[:, None], np.arange(gdim)).ravel()
         self._present = PresentInterface(lumped, self.dynamics)
         self.index = self._present.index
         self.stability = Stability(self.bodies, self.dynamics, self.further, self._at_interface)
         self._at_nodes = np.zeros(gdim * len(nodes))
         self._has_face_loads = self._patterns.take_faces(lumped)
-        self.dynamics.v = nodes.gather(self._velocity)
+        self.dynamics.v = nodes.gather(self._velocity)[:, :gdim]
 
     @property
     def velocity(self) -> Array:
@@ -219,8 +226,12 @@ class ExplicitSolver:
     def set_displacement(self, owned: Array) -> None:
         """Begin with a displacement of the owned dofs, shape (n_local,), length; collective."""
         x = self.bodies.u.x
-        x.array[: self.continuum.n_local] = owned
+        x.array[: self.continuum.n_local] = self.points.motion(owned)
         x.scatter_forward()
+
+    def _at_points(self, owned: Array) -> Array:
+        """A motion at the points of the interface nodes, shape (n_nodes, gdim); collective."""
+        return self.lumped.nodes.gather(owned)[:, : self.continuum.gdim]
 
     def _start(self, coordinates: Array) -> None:
         """Displacements that supports prescribe from the first moment, and the first energies."""
@@ -228,7 +239,7 @@ class ExplicitSolver:
         fixed = np.flatnonzero(self.supports.which >= 0)
         u[fixed] = self.supports.value[fixed] * coordinates[self.supports.which[fixed]]
         self.bodies.u.x.scatter_forward()
-        self.dynamics.u = self.lumped.nodes.gather(u[: self.continuum.n_local])
+        self.dynamics.u = self._at_points(u[: self.continuum.n_local])
         self.lumped.follow(self.dynamics.v)
         self._outer.factors = coordinates[len(self.supports.columns) :]
         self.bodies.begin(self.at)
@@ -419,8 +430,8 @@ class ExplicitSolver:
         self.velocity[:] = saved.v
         self.at, self.last_dt, self.increments = saved.at, saved.last_dt, saved.increments
         self.energies.restore(saved.sums)
-        self.dynamics.u = self.lumped.nodes.gather(x.array[:n])
-        self.dynamics.v = self.lumped.nodes.gather(self.velocity)
+        self.dynamics.u = self._at_points(x.array[:n])
+        self.dynamics.v = self._at_points(self.velocity)
         saved.interfaces.restore(self.dynamics)
         self.bodies.restore(saved.bodies)
         self._outer.forget()
@@ -463,12 +474,19 @@ class ExplicitSolver:
         assert self._now is not None
         columns = len(self.supports.columns)
         u = self.bodies.u.x.array[: self.continuum.n_local]
-        reactions = self.prescribed.by_column(self.reactions(), columns)
+        reactions = self._reactions_by_column(columns)
         conjugate = [*reactions.tolist(), *self._patterns.conjugates(u)]
         sums = sums_over_ranks(self.comm, *conjugate, *self._patterns.monitored(u))
         self.monitored = sums[len(conjugate) :]
         force, jumps = self._present.in_frames()
         self.state = Equilibrium(self._now, force, jumps, np.array(sums[: len(conjugate)]))
+
+    def _reactions_by_column(self, n_columns: int) -> Array:
+        """Reactions by support column, shape (n_columns,), of this rank."""
+        found = self.reactions()
+        if not self.points.exist:
+            return self.prescribed.by_column(found, n_columns)
+        return self.points.reactions(self.prescribed.on_unknowns(found, self.lumped), n_columns)
 
     def about(self) -> dict[str, Any]:
         """What is worth keeping with a history, plain types."""
@@ -514,7 +532,7 @@ class ExplicitSolver:
 
     def displacements_of(self, where: list[Ints]) -> Array:
         """Mean displacements of sets of owned nodes, shape (n_sets, gdim); collective."""
-        u = self.continuum.layout.displacements(self.bodies.u.x.array[: self.continuum.n_local])
+        u = self.continuum.layout.displacements(self.points.nodal(self._owned))
         sums = [[*u[nodes].sum(axis=0), len(nodes)] for nodes in where]
         flat = np.array(sums_over_ranks(self.comm, *np.ravel(sums))).reshape(len(where), -1)
         return np.asarray(flat[:, :-1] / flat[:, -1:])
@@ -524,7 +542,7 @@ class ExplicitSolver:
         vector = PETSc.Vec().createMPI(
             (self.continuum.n_local, self.continuum.n_global), comm=self.comm
         )
-        vector.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
+        vector.array[:] = self.points.nodal(self.bodies.u.x.array[: self.continuum.n_local])
         return vector
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
@@ -543,7 +561,7 @@ class ExplicitSolver:
             forces = self._at_nodes.reshape(-1, self.continuum.gdim)
             held = lumped.mass[mine, None] * self.dynamics.a[mine] - forces[mine]
             values[self._at_interface] = held.ravel()
-        vector.array[:] = values
+        vector.array[:] = self.points.nodal_forces(values)
         return vector
 
     def destroy(self) -> None:

@@ -103,7 +103,7 @@ def stored_energies(
     """
     comm, n = bodies.continuum.comm, len(velocity)
     square = velocity * velocity
-    kinetic, added = 0.5 * float(mass.values @ square), 0.5 * float(mass.added @ square)
+    kinetic, added = 0.5 * float(mass.values @ square), mass.added_energy(velocity)
     now = bodies.u.x.array[:n].copy()
     if bodies.linear:
         strain = 0.5 * float((now - dt * velocity) @ motion.whole())

@@ -13,6 +13,7 @@ from fxcrack.continuum.load_vectors import LoadPattern, load_vector, monitor_wei
 from fxcrack.continuum.loads import Load, Monitor
 from fxcrack.continuum.thermal_strain import ThermalLoad, held_energies
 from fxcrack.interface.lumped import LumpedInterface
+from fxcrack.solvers.explicit_points import FacePoints
 
 
 class LoadsAndMonitors:
@@ -22,6 +23,7 @@ class LoadsAndMonitors:
         continuum: Displacement space.
         loads: Force patterns, those of the temperature last.
         monitors: Monitored displacements.
+        points: Unknowns at interfaces of shells.
 
     Raises:
         InputError: A load or a monitor does not fit the bodies.
@@ -32,11 +34,14 @@ class LoadsAndMonitors:
     """
 
     def __init__(
-        self, continuum: Continuum, loads: Sequence[Any], monitors: Sequence[Monitor]
-    ) -> None:
+        self, continuum: Continuum, loads: Sequence[Any], monitors: Sequence[Monitor],
+        points: FacePoints,
+    ) -> None:  # fmt: skip
         self._n_local = continuum.n_local
-        self._loads = [_load_pattern(continuum, load) for load in loads]
-        self._monitors = [LoadPattern(monitor_weights(continuum, m)) for m in monitors]
+        self._gdim = continuum.gdim
+        self._loads = [_load_pattern(continuum, load, points) for load in loads]
+        weights = [monitor_weights(continuum, m) for m in monitors]
+        self._monitors = [LoadPattern(points.forces(w)) for w in weights]
         self.n_loads = len(loads)
         self.n_thermal = sum(isinstance(load, ThermalLoad) for load in loads)
         self._held = held_energies(continuum) if self.n_thermal else np.zeros((0, 0))
@@ -53,7 +58,7 @@ class LoadsAndMonitors:
         nodes, n = lumped.nodes, self._n_local
         # a temperature acts within the bodies, which its forces at their faces only balance
         outer = self._loads[: len(self._loads) - self.n_thermal]
-        found = [nodes.gather(p.dense(n))[lumped.slave] for p in outer]
+        found = [nodes.gather(p.dense(n))[lumped.slave, : self._gdim] for p in outer]
         has = any(np.any(f) for f in found)
         self._on_faces = found if has else []
         return has
@@ -129,9 +134,11 @@ class LoadsAndMonitors:
         return [float(p.values @ u[p.at]) for p in self._monitors]
 
 
-def _load_pattern(continuum: Continuum, load: Load | ThermalLoad) -> LoadPattern:
+def _load_pattern(
+    continuum: Continuum, load: Load | ThermalLoad, points: FacePoints
+) -> LoadPattern:
     vector = load_vector(continuum, load)
-    out = LoadPattern(np.array(vector.array_r))
+    out = LoadPattern(points.forces(np.array(vector.array_r)))
     vector.destroy()
     return out
 

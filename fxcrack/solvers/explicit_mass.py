@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.continuum.lumped_mass import lumped_mass
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.shell_mass import shell_mass
+from fxcrack.solvers.explicit_points import FacePoints
 from fxcrack.solvers.options import ExplicitOptions
 
 
@@ -34,6 +36,18 @@ class ScaledMass:
         self.inverse = 1.0 / self.values
         self.is_scaled = enlarged is not None
         self._chosen = False
+        self._points: FacePoints | None = None
+
+    def take_points(self, points: FacePoints) -> None:
+        """Take the unknowns of interfaces of shells; :attr:`added` stays on u and w."""
+        self._points = points if points.exist else None
+        self.values = points.masses(self._bare).copy()
+        self.inverse = 1.0 / self.values
+
+    def added_energy(self, velocity: Array) -> float:
+        """Kinetic energy of what was added, this rank's part, at a velocity, shape (n_local,)."""
+        v = velocity if self._points is None else self._points.nodal(velocity)
+        return 0.5 * float(self.added @ (v * v))
 
     @classmethod
     def of(cls, continuum: Continuum, effect: Inertia) -> ScaledMass:
@@ -75,6 +89,11 @@ class ScaledMass:
         """
         if isinstance(options.mass_scale, str):
             assert options.dt is not None
+            if self._points is not None:
+                raise InputError(
+                    "Explicit: mass_scale='dt' is not available beside interfaces of shells; give "
+                    "a number, which scales the mass of all bodies"
+                )
             mass = self._enough_for(options.dt, bodies)
         elif options.mass_scale != 1.0 or self._chosen:
             mass = options.mass_scale * self._bare
@@ -82,7 +101,9 @@ class ScaledMass:
             return False
         self.values, self.added = mass, mass - self._bare + self._enlarged
         self.is_scaled = self._chosen = True
-        self.inverse = 1.0 / mass
+        if self._points is not None:
+            self.values = self._points.masses(mass)
+        self.inverse = 1.0 / self.values
         return True
 
     def _enough_for(self, dt: float, bodies: InternalForces) -> Array:

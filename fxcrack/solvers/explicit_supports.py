@@ -77,5 +77,14 @@ class PrescribedMotion:
         """Reactions summed over the dofs of each column, shape (n_columns,); this rank's part."""
         return np.bincount(self.columns, self.values * reactions, n_columns)
 
+    def on_unknowns(self, reactions: Array, lumped: LumpedInterface) -> Array:
+        """Reactions at the owned dofs, shape (n_local,), 0 where nothing is prescribed."""
+        layout, (node, component) = lumped.nodes.layout, self._nodes
+        out = np.zeros(layout.n_local)
+        out[self.dofs] = reactions[: len(self.dofs)]
+        at = layout.dof(lumped.nodes.local[node - lumped.nodes.mine.start], component)
+        out[at] = reactions[len(self.dofs) :]
+        return out
+
 
 __all__ = ["PrescribedMotion"]

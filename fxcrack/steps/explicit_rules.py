@@ -11,6 +11,7 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.shell_bodies import ShellBodies
+from fxcrack.continuum.term import Term
 from fxcrack.criteria import VCCT
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.definition import Interface
@@ -47,16 +48,32 @@ def _check_shells(shell: ShellBodies, interfaces: Sequence[Interface]) -> None:
         InputError: Says what, and what to do instead.
     """
     instead = "use a Dynamic step, or ContinuumShell on hexahedra of first order"
-    if shell.order == 1 and interfaces:
-        raise InputError(
-            f"Explicit: interface '{interfaces[0].title}' bonds faces of shells on surface meshes, "
-            "whose displacement and director share one inertia at the face, which explicit "
-            f"dynamics does not have; {instead}"
-        )
+    for interface in interfaces:
+        if interface.stiffness is not None:
+            raise InputError(
+                f"Explicit: interface '{interface.title}' between shells has bonds with a "
+                "stiffness; leave stiffness out, exact bonds take no increment"
+            )
     if shell.order == 1 and len(shell.layout.joints.nodes):
         raise InputError(
             "Explicit: the surface has kinks or T joints, where nodes of several parts move "
             f"together, which explicit dynamics of shells does not have; {instead}"
+        )
+
+
+def check_large_rotation(
+    continuum: Continuum, interfaces: Sequence[Interface], terms: Sequence[Term]
+) -> None:
+    """Refuse interfaces between shells of large rotation.
+
+    Raises:
+        InputError: There is one.
+    """
+    if isinstance(continuum, ShellBodies) and interfaces and any(t.finite for t in terms):
+        raise InputError(
+            f"Explicit: interface '{interfaces[0].title}' between shells is for small rotations; "
+            "leave FiniteStrain() out, use a Dynamic step, or ContinuumShell on hexahedra of first "
+            "order"
         )
 
 

@@ -15,7 +15,12 @@ from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_bodies, check_constraints, inertia_of
+from fxcrack.steps.explicit_rules import (
+    check_bodies,
+    check_constraints,
+    check_large_rotation,
+    inertia_of,
+)
 
 
 def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequence[Term]]) -> None:
@@ -41,6 +46,7 @@ def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequenc
     check_bodies(analysis.continuum, old.loads, interfaces)
     check_constraints(old.supports.constraints)
     found = terms(analysis.continuum)
+    check_large_rotation(analysis.continuum, interfaces, found)
     heat: list[Any] = []
     if is_linear(analysis.continuum) and all(
         t.constant for t in found if not isinstance(t, FollowerPressure)
