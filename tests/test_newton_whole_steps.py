@@ -87,3 +87,34 @@ def test_a_turn_without_stress_is_not_divided() -> None:
     )
     assert scene.run(fx.Static(until=fx.Time(1.0))).reason == "time 1 reached"
     assert scene.solver.counts.solves == len(clock)
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+def test_a_rejected_trial_that_is_unstable_ends_no_step(comm: MPI.Intracomm) -> None:
+    """An arm sheared by half its height in one increment or in ten, with contact.
+
+    The first trial buckles and is rejected; its tangent holds fewer faces than the start does.
+    """
+    energies = []
+    for increment in (1.0, 0.1):
+        scene = specimen(
+            dcb_2d(comm, length=24.0, height=1.5, dx=1.0, ny=2),
+            a0=10.0,
+            contact=True,
+            criterion=fx.VCCT(GIc=1e4),
+            supports=[
+                fx.Displacement("pin_top", x=0.8, y=0.16),
+                fx.Displacement("bottom", x=0.0, y=0.0),
+            ],
+            effects=[FiniteStrain()],
+        )
+        step = fx.Static(
+            until=fx.Time(1.0), stepping="increment", initial=increment, maximum=increment
+        )
+        history = scene.run(step, progress=False)
+        assert history[-1]["time"] == 1.0
+        energies.append(float(history[-1]["strain_energy"]))
+        scene.close()
+    # faces slide: pairs renewed in one increment or in ten, first order
+    assert energies[0] == pytest.approx(energies[1], rel=1e-3)

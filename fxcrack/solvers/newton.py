@@ -318,7 +318,14 @@ class NewtonSolver(InterfaceSolver):
 
     def revert(self) -> None:
         """Reject the last trial; collective."""
-        self.restore_interfaces(self._before)
+        try:
+            self.restore_interfaces(self._before)
+        except NotPositiveDefinite:
+            # the tangent at hand is that of an unstable trial, which holds less than the accepted
+            # state: nothing is freed until the tangent is that of the accepted state again
+            self.system.hold(self.system.cholesky.free.copy())
+            self._return()
+            self.restore_interfaces(self._before)
         self._return()
 
     def _fail(self) -> None:
