@@ -188,6 +188,8 @@ def test_a_free_bar_under_a_temperature_has_no_stress():
     row = scene.run(fx.Static(until=fx.Time(1.0)), grow=[], progress=False).rows[-1]
     assert row["strain_zz"] == pytest.approx(1.2e-5 * 50.0, rel=EXACT)
     assert row["strain_energy"] < 1e-9 * STEEL.E * row["strain_zz"] ** 2 * 20.0 * 2.0
+    # 24 nodes; the strain is one unknown
+    assert scene.explain().unknowns["displacements"] == 3 * 24 + 1
 
 
 # -- cracks ----------------------------------------------------------------------------------------

@@ -77,6 +77,12 @@ class DofLayout:
         self.offset = self.n_unknowns * self.first_node
         self.joints = NO_JOINTS
 
+    @property
+    def n_distinct(self) -> int:
+        """Number of unknowns of the bodies: those of all nodes, shared ones once."""
+        n_nodes, own = int(self.first_nodes[-1]), self.n_unknowns - len(self.shared)
+        return own * n_nodes + len(self.shared)
+
     def dofs(self, nodes: npt.NDArray[np.integer]) -> Ints:
         """All dofs of nodes.
 

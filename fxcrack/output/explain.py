@@ -83,7 +83,7 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
     solver = analysis.solver
     if isinstance(solver, ExplicitSolver):
         return _explicit(analysis, solver)
-    unknowns = {"displacements": analysis.continuum.n_global}
+    unknowns = {"displacements": analysis.continuum.layout.n_distinct}
     counts = {"form terms": 1, "factorisations": solver.timings.factorizations}
     costs: dict[str, float] = {}
     if analysis.started:

@@ -161,7 +161,7 @@ def _bodies(analysis: Analysis) -> str:
     cells = mesh.domain.topology.index_map(mesh.domain.topology.dim).size_global
     return (
         f"Mesh '{mesh.name}': {cells:,} cells in {mesh.gdim} dimensions, "
-        f"{continuum.n_global:,} unknown displacements; "
+        f"{continuum.layout.n_distinct:,} unknown displacements; "
         f"{len(analysis.pairs)} interface{'' if len(analysis.pairs) == 1 else 's'}."
     )
 
