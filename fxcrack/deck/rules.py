@@ -14,7 +14,6 @@ from fxcrack.deck.model import Model
 from fxcrack.deck.procedures import Procedure
 from fxcrack.deck.properties import Sections
 from fxcrack.deck.supports import AnySupport, Boundary
-from fxcrack.steps.explicit import Explicit
 
 
 def density_of(material: Material | Section) -> float | None:
@@ -24,18 +23,12 @@ def density_of(material: Material | Section) -> float | None:
     return density
 
 
-def check_shells(procedures: Sequence[Procedure], loads: Loads) -> None:
+def check_shells(loads: Loads) -> None:
     """Refuse what shells on surfaces do not have.
 
     Raises:
         DeckError: Says which, and what to do instead.
     """
-    for procedure in procedures:
-        if isinstance(procedure.step, Explicit):
-            procedure.card.fail(
-                "shells on surfaces have no explicit dynamics here; take continuum shells (SC8R), "
-                "solids, or implicit *DYNAMIC"
-            )
     entry = loads.following
     if entry is not None:
         entry.row.fail(

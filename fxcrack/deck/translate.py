@@ -137,7 +137,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     sections = read_sections(flat, groups, report, stresses)
     _check_finite(finite, sections, model)
     if flat.kind.shell:
-        check_shells(procedures, loads)
+        check_shells(loads)
     moving = [p for p in procedures if p.inertia is not None]
     if moving:
         check_density(moving[0], sections, model)
