@@ -168,6 +168,7 @@ def solver_of_path(path: str, solver: str | None) -> str:
     )
     if solver is not None:
         raise InputError("Scene: path is the former name of solver; give solver alone")
+    text("Scene", "path", path)
     return "linear" if path == "condensed" else path
 
 

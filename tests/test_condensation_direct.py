@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -129,6 +131,26 @@ def test_solving_with_the_factor() -> None:
     expected = scipy.sparse.linalg.spsolve(whole[inner][:, inner].tocsc(), right.array[inner])
     assert solution.array[inner] == pytest.approx(expected, abs=ROUND_OFF * 10)
     factor.destroy()
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+def test_what_is_not_renewed_keeps_no_copy(comm: MPI.Intracomm) -> None:
+    """S where PETSc has put it is the same, to the last bit, and outlives the factor."""
+    last = np.arange(30) * 30 + 7
+    matrix, _, _ = grid_matrix(comm, 30, last)
+    copied, in_place = (SchurFactor(matrix, 30, renewable=r) for r in (True, False))
+    expected, found = copied.schur.copy(), in_place.schur
+    assert found.flags.c_contiguous and np.array_equal(found, expected)
+    assert found.flags.owndata == (comm.size > 1)
+    copied.destroy()
+    in_place.destroy()
+    del copied, in_place
+    gc.collect()
+    another = SchurFactor(matrix, 30)  # would take the memory if it were free
+    assert np.array_equal(found, expected)
+    another.destroy()
+    matrix.destroy()
 
 
 @pytest.mark.parametrize("n", [1, 2, 255, 256, 257, 600])

@@ -433,9 +433,9 @@ def plate(**options: Any) -> fx.ContinuumShell:
         ({"bottom": None}, "name of a group"),
         ({"top": "inner"}, "either side"),
         ({"axis": None}, "measured from"),
-        ({"axis": (1, 0)}, "three numbers"),
+        ({"axis": (1, 0)}, "3 numbers"),
         ({"axis": (0, 0, 0)}, "no direction"),
-        ({"shear_factors": (0.8,)}, "two numbers"),
+        ({"shear_factors": (0.8,)}, "2 numbers"),
         ({"shear_factors": (0.8, 1.2)}, "at most 1"),
     ],
 )

@@ -81,6 +81,34 @@ def test_differences_of_large_numbers_are_no_alarm(comm: MPI.Intracomm) -> None:
     check_energy(History(comm), 0)
 
 
+@pytest.mark.parametrize("effects", [[], [fx.FiniteStrain()]])
+def test_bodies_that_move_as_one_are_no_alarm(
+    comm: MPI.Intracomm, caplog: pytest.LogCaptureFixture, effects: list[object]
+) -> None:
+    """There and back by one length: all energies are round-off, and in the end nothing is moved.
+
+    The work is 1e-11 to 1e-10 (round-off of forces, E = 70e3, times 1), all of it missing.
+    """
+    there_and_back = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 1.0, 0.0))
+    scene = fx.Scene(
+        dcb_2d(comm, length=8.0, dx=1.0, ny=1),
+        materials=STEEL,
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement(end, x=1.0, y=0.0, amplitude=there_and_back)
+            for end in ("end_lower", "end_upper")
+        ],
+        debonds=[fx.Debond(bond(3.0), fx.VCCT(GIc=0.2))],
+        effects=effects,
+        solver="newton",
+    )
+    with caplog.at_level(logging.WARNING, logger="fxcrack"):
+        for end in (1.0, 2.0):
+            scene.run(fx.Static(until=fx.Time(end), stepping="increment"), progress=False)
+    scene.close()
+    assert not [m for m in caplog.messages if "energy balance" in m]
+
+
 @pytest.mark.mpi
 def test_a_step_that_loses_energy_ends_with_an_error_and_its_history(
     comm: MPI.Intracomm, monkeypatch: pytest.MonkeyPatch

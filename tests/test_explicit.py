@@ -246,6 +246,28 @@ def test_slow_loading_is_quasi_static() -> None:
 # -- impact ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
+def test_the_implicit_step_has_the_same_history_at_the_same_increments() -> None:
+    """Release by the same law: with one mass and one increment, what is left is the integration."""
+    speed, dt, lengths = 8e3, 8e-8, (31.0, 32.0, 33.0)
+    found = []
+    for explicit in (True, False):
+        # the default of the implicit step is a release at once
+        scene = beam(
+            MPI.COMM_SELF, speed, effects=[fx.Inertia(lumped=True)], release=fx.ProgressiveRelease()
+        )
+        if explicit:
+            step: Any = until(scene, 33.0, 1.3e-4, rows=5000, dt=dt)
+        else:
+            ends = [fx.CrackLength(interface_of(scene), 33.0), fx.Time(1.3e-4)]
+            step = fx.Dynamic(until=ends, dt=dt)
+        found.append(opening_at(scene.run(step), speed, lengths))
+        scene.close()
+    # both converge with the increment (explicit: 0.3 % from a half of it), the implicit one more
+    # slowly; the consistent mass is off by 1.8 %, 1/160 of the period of an arm by 12 %
+    assert found[0] == pytest.approx(found[1], rel=0.01)
+
+
 @pytest.mark.mpi
 def test_two_bars_meet(comm: MPI.Intracomm) -> None:
     """Pressure rho c v/2 for 2 L/c, and the second bar takes the whole velocity."""

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.base.sparse import Product
+from fxcrack.continuum import block_product
+from fxcrack.continuum.block_product import BlockProduct, fast_product
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.meshes.dcb import dcb_3d
@@ -34,3 +38,39 @@ def test_product_is_that_of_the_whole_matrix(comm: MPI.Intracomm) -> None:
     assert np.abs(found - forces.array_r).max(initial=0.0) < 1e-12 * largest
     for thing in (matrix, u, forces):
         thing.destroy()
+
+
+@pytest.mark.parametrize("size", [2, 3])
+def test_block_products_are_those_of_the_matrix(size: int) -> None:
+    """Blocks that are full, those with zeros, rows without any, and matrices without rows."""
+    random = np.random.default_rng(7)
+    dense = random.standard_normal((12 * size, 20 * size))
+    dense *= np.kron(random.random((12, 20)) < 0.3, np.ones((size, size)))
+    dense[4 * size : 5 * size] = 0.0
+    dense[7 * size] = 0.0
+    product = fast_product(sp.csr_matrix(dense), size, MPI.COMM_SELF)
+    x, y = random.standard_normal(20 * size), random.standard_normal(12 * size)
+    wanted = y + 3.0 * dense @ x
+    product.data *= 3.0
+    product.add(x, y)
+    assert isinstance(product, BlockProduct)
+    assert product.shape == dense.shape
+    # round-off of sums of some ten terms
+    assert y == pytest.approx(wanted, rel=1e-13, abs=1e-13)
+    assert product.into(x, np.ones(len(y))) == pytest.approx(3.0 * dense @ x, rel=1e-13, abs=1e-13)
+    none = fast_product(sp.csr_matrix((0, 2 * size)), size, MPI.COMM_SELF)
+    assert none(np.ones(2 * size)).shape == (0,)
+
+
+def test_products_take_those_of_scipy_where_there_is_no_compiler(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def refuse() -> None:
+        raise OSError("no compiler")
+
+    monkeypatch.setattr(block_product, "_loaded", {})
+    monkeypatch.setattr(block_product, "_load", refuse)
+    product = fast_product(sp.identity(4, format="csr"), 2, MPI.COMM_SELF)
+    assert isinstance(product, Product)
+    assert product(np.arange(4.0)) == pytest.approx(np.arange(4.0))
+    assert "no compiler" in caplog.text

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
+from mpi4py import MPI
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array
@@ -260,6 +262,29 @@ def text(owner: str, name: str, value: object, *, optional: bool = False) -> Non
     if not isinstance(value, str) or not value:
         other = "; None for the default" if optional else ""
         raise InputError(f"{owner}: {name} = {shown(value)} must be a name, a text{other}")
+
+
+def file_path(owner: str, name: str, value: object) -> Path:
+    """Return the path of a file.
+
+    Raises:
+        InputError: It is neither a text nor a path.
+    """
+    if not isinstance(value, str | Path):
+        raise InputError(f"{owner}: {name} = {shown(value)} must be a path, a text or a Path")
+    return Path(value)
+
+
+def communicator(owner: str, value: object) -> None:
+    """Check that a value is a communicator of mpi4py.
+
+    Raises:
+        InputError: It is not.
+    """
+    if not isinstance(value, MPI.Comm):
+        raise InputError(
+            f"{owner}: comm = {shown(value)} must be a communicator of mpi4py, e.g. MPI.COMM_WORLD"
+        )
 
 
 def numbers(

@@ -12,6 +12,9 @@ from fxcrack.base.arrays import Ints
 
 Block = npt.NDArray[Any]
 
+_TAG = 4711
+"""Of messages that are on their way beside collective calls of others."""
+
 
 class Halo:
     """Exchange of the rows of a block that neighbours need.
@@ -55,4 +58,55 @@ class Halo:
         np.add.at(x, self._rows, into)
 
 
-__all__ = ["Halo"]
+class NodeUpdate:
+    """Values of nodes that neighbours need, on their way while this rank goes on computing.
+
+    Args:
+        comm: Communicator.
+        ranges: First node of every rank and the total, shape (n_ranks + 1,).
+        ghosts: Global nodes this rank needs from others, shape (n_ghosts,), any order.
+        width: Values of a node.
+
+    Attributes:
+        rows: Owned nodes that other ranks need, once for each of these, shape (n_sent,).
+        values: Their values, to be set before :meth:`start`, shape (n_sent, width).
+    """
+
+    def __init__(self, comm: MPI.Intracomm, ranges: Ints, ghosts: Ints, width: int) -> None:
+        self._comm = comm
+        self._order = np.argsort(ghosts, kind="stable")
+        halo = Halo(comm, ranges, np.asarray(ghosts)[self._order])
+        self.rows = halo._rows
+        self.values = np.zeros((len(self.rows), width))
+        self._arrived = np.zeros((len(ghosts), width))
+        self._to = _blocks(halo._send)
+        self._from = _blocks(halo._receive)
+        self._requests: list[MPI.Request] = []
+
+    def start(self) -> None:
+        """Send :attr:`values`, and take what neighbours send; :meth:`finish` must follow."""
+        comm = self._comm
+        self._requests = [
+            comm.Irecv(self._arrived[part], source=rank, tag=_TAG) for rank, part in self._from
+        ]
+        self._requests += [
+            comm.Isend(self.values[part], dest=rank, tag=_TAG) for rank, part in self._to
+        ]
+
+    def finish(self, ghosts: Block) -> None:
+        """Wait for the neighbours; their values into ``ghosts``, shape (n_ghosts, width)."""
+        MPI.Request.Waitall(self._requests)
+        ghosts[self._order] = self._arrived
+
+
+def _blocks(counts: Ints) -> list[tuple[int, slice]]:
+    """Ranks with some rows, and these rows, of rows sorted by rank."""
+    ends = np.cumsum(counts)
+    return [
+        (rank, slice(int(end - n), int(end)))
+        for rank, (n, end) in enumerate(zip(counts.tolist(), ends.tolist(), strict=True))
+        if n
+    ]
+
+
+__all__ = ["Halo", "NodeUpdate"]

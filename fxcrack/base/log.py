@@ -97,7 +97,8 @@ def level_of(level: int | str) -> int:
         return int(getattr(logging, level.upper()))
     if isinstance(level, int) and not isinstance(level, bool):
         return level
-    raise InputError(f"log level {level!r}: give one of {', '.join(_LEVELS)}")
+    given = f"'{level}'" if isinstance(level, str) else f"of type {type(level).__name__}"
+    raise InputError(f"log level {given}: give one of {', '.join(_LEVELS)}")
 
 
 def show(level: int | str = "info") -> None:

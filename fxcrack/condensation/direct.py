@@ -74,7 +74,7 @@ class DirectCondensation:
         self.coordinates = coordinates
         self.timings = timings
         self.n_negative = 0
-        self._definite, self._doubt = definite, doubt
+        self._definite, self._doubt, self._renewable = definite, doubt, renewable
         self._comm = compat.plain_comm(stiffness.getComm().tompi4py())
         self._factor: SchurFactor | None = None
         self._inner: PETSc.KSP | None = None
@@ -125,7 +125,7 @@ class DirectCondensation:
         if self._factor is None:
             self._factor = SchurFactor(
                 self.matrix, self.coordinates.n_last, gdim=gdim, definite=self._definite,
-                doubt=self._doubt,
+                renewable=self._renewable, doubt=self._doubt,
             )  # fmt: skip
         else:
             self._factor.renew(self.matrix)

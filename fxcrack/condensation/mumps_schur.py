@@ -66,6 +66,27 @@ def _let_go(lib: ctypes.CDLL, factor: ctypes.c_void_p) -> None:
         lib.PetscObjectDelayedDestroy(ctypes.byref(factor))
 
 
+class _DenseInPlace:
+    """The entries of PETSc's dense S as an array of numpy, kept after the factor is gone.
+
+    Args:
+        lib: PETSc's C interface.
+        dense: Sequential dense matrix, of which this keeps a reference.
+        address: That of its entries.
+        n: Number of its rows.
+    """
+
+    def __init__(self, lib: ctypes.CDLL, dense: ctypes.c_void_p, address: int, n: int) -> None:
+        lib.PetscObjectReference(dense)
+        weakref.finalize(self, _let_go, lib, ctypes.c_void_p(dense.value)).atexit = False
+        self.__array_interface__ = {
+            "data": (address, False),
+            "shape": (n, n),
+            "typestr": np.dtype(float).str,
+            "version": 3,
+        }
+
+
 class SchurFactor:
     """Cholesky factor of A_11 together with the dense S; collective.
 
@@ -76,6 +97,8 @@ class SchurFactor:
         gdim: Dimension of the bodies, which decides the ordering.
         definite: Whether the leading block must be positive definite; a tangent on the way to an
             equilibrium need not be.
+        renewable: Whether :meth:`renew` is called later on. Else S stays, on one rank, where PETSc
+            has put it, instead of in a copy beside.
         doubt: Called on all ranks with the smallest pivot over the largest where that may be
             round-off, 0 where it has the wrong sign; raises if the factor must not be used. By
             default such a factor is refused where the block must be positive definite.
@@ -95,6 +118,7 @@ class SchurFactor:
         *,
         gdim: int = 3,
         definite: bool = True,
+        renewable: bool = True,
         doubt: Doubt | None = None,
     ) -> None:
         lib = library()
@@ -111,6 +135,7 @@ class SchurFactor:
         matrix.setOption(PETSc.Mat.Option.SYMMETRIC, True)
         matrix.setOption(PETSc.Mat.Option.SPD, definite)
         self._n_last, self._definite, self._doubt = n_last, definite, doubt
+        self._in_place = not renewable and self._comm.size == 1
         self._from_scratch(matrix)
 
     def renew(self, matrix: PETSc.Mat) -> None:
@@ -177,14 +202,20 @@ class SchurFactor:
         self._call(
             "MatFactorGetSchurComplement", self._factor, ctypes.byref(dense), ctypes.byref(status)
         )
-        out = np.empty((n_last, n_last))
+        out = np.empty((0, 0) if self._in_place else (n_last, n_last))
         if self._comm.rank == 0:
             data = ctypes.POINTER(ctypes.c_double)()
             self._call("MatDenseGetArrayRead", dense, ctypes.byref(data))
-            raw = np.ctypeslib.as_array(data, (n_last, n_last))  # stored by columns
-            # the other triangle may hold remains of the elimination
-            np.copyto(out, raw.T if self._comm.size == 1 else raw)
-            mirror_lower(out)
+            # stored by columns; the other triangle may hold remains of the elimination
+            if self._in_place:
+                address = ctypes.cast(data, ctypes.c_void_p).value
+                assert address is not None
+                out = np.asarray(_DenseInPlace(self._lib, dense, address, n_last))
+                mirror_lower(out.T)
+            else:
+                raw = np.ctypeslib.as_array(data, (n_last, n_last))
+                np.copyto(out, raw.T if self._comm.size == 1 else raw)
+                mirror_lower(out)
             self._call("MatDenseRestoreArrayRead", dense, ctypes.byref(data))
         self._call("MatFactorRestoreSchurComplement", self._factor, ctypes.byref(dense), status)
         self._comm.Bcast(out)

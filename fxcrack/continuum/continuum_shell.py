@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import keep, numbers, shown
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.laminate import Laminate, Ply
 from fxcrack.continuum.materials import Material
@@ -57,10 +58,10 @@ class ContinuumShell:
         """Check the arguments."""
         laminate = self.laminate
         for name in ("bottom", "top"):
-            if not isinstance(getattr(self, name), str):
+            given = getattr(self, name)
+            if not isinstance(given, str):
                 raise InputError(
-                    f"ContinuumShell: {name} = {getattr(self, name)!r} must be the name of a group "
-                    "of faces"
+                    f"ContinuumShell: {name} = {shown(given)} must be the name of a group of faces"
                 )
         if self.bottom == self.top:
             raise InputError(
@@ -73,18 +74,18 @@ class ContinuumShell:
                 "e.g. axis=(1, 0, 0)"
             )
         if self.axis is not None and not callable(self.axis):
-            axis = np.asarray(self.axis)
-            if axis.shape != (3,) or axis.dtype.kind not in "fiu" or not np.all(np.isfinite(axis)):
-                raise InputError(f"ContinuumShell: axis = {self.axis!r} must be three numbers")
-            if not axis.any():
+            axis = numbers("ContinuumShell", "axis", self.axis, 3)
+            keep(self, axis=axis)
+            if not any(axis):
                 raise InputError("ContinuumShell: axis = (0, 0, 0) has no direction")
         if self.shear_factors is not None:
-            k = np.asarray(self.shear_factors)
-            if k.shape != (2,) or k.dtype.kind not in "fiu" or not np.all((k > 0.0) & (k <= 1.0)):
+            k = numbers("ContinuumShell", "shear_factors", self.shear_factors, 2, words="k13, k23")
+            if not all(0.0 < value <= 1.0 for value in k):
                 raise InputError(
-                    f"ContinuumShell: shear_factors = {self.shear_factors!r} must be two numbers "
-                    "(k13, k23), above 0 and at most 1"
+                    f"ContinuumShell: shear_factors = {k} must be two numbers (k13, k23), above 0 "
+                    "and at most 1"
                 )
+            keep(self, shear_factors=k)
 
     @property
     def laminate(self) -> Laminate:

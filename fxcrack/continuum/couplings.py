@@ -79,8 +79,8 @@ class Coupling:
 
     def __post_init__(self) -> None:
         """Check names and numbers."""
-        owner = f"Coupling('{self.where}')"
         text("Coupling", "where", self.where)
+        owner = f"Coupling('{self.where}')"
         text(owner, "name", self.name, optional=True)
         given = list_of(self.point)
         if given is None or len(given) not in (2, 3):
@@ -90,7 +90,8 @@ class Coupling:
             value = getattr(self, motion)
             if value is not None:
                 keep(self, **{motion: number(owner, motion, value)})
-        flag(owner, "mean", self.mean)
+        for name in ("rotations", "mean"):
+            keep(self, **{name: flag(owner, name, getattr(self, name))})
         number_or_function(owner, "weight", self.weight)
         if not is_function(self.weight):
             positive(owner, weight=self.weight)

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fxcrack.base.checks import one_of
-from fxcrack.base.errors import InputError
+from fxcrack.base.checks import one_of, text
 
 
 @dataclass(frozen=True)
@@ -24,8 +23,7 @@ class Face:
 
     def __post_init__(self) -> None:
         """Check the side."""
-        if not isinstance(self.group, str):
-            raise InputError(f"Face: group = {self.group!r} must be the name of a group of cells")
+        text("Face", "group", self.group)
         one_of("Face", "side", self.side, ("top", "bottom"))
 
     def __str__(self) -> str:

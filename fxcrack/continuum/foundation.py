@@ -21,7 +21,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Ints
-from fxcrack.base.checks import as_float
+from fxcrack.base.checks import as_float, shown
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.shell_bodies import ShellBodies
@@ -49,7 +49,7 @@ def check_stabilise(value: object) -> None:
     for name, given in entries.items():
         number = as_float(given)
         if not isinstance(name, str) or number is None or not 0.0 < number < 1.0:
-            raise InputError(f"Scene: stabilise = {value!r}: {words}")
+            raise InputError(f"Scene: stabilise = {shown(value)}: {words}")
 
 
 class Foundation(Term):

@@ -24,6 +24,8 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.halo import Halo
+from fxcrack.base.sparse import Product
+from fxcrack.continuum.block_product import BlockProduct, fast_product
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kernels import fast_form
@@ -156,6 +158,7 @@ class InternalForces:
         self._form: Any = None
         self._energies: dict[str, Any] = {}
         self._matrix: sp.csr_matrix | None = None
+        self._blocks: BlockProduct | Product | None = None
         self._further: FurtherNodes | None = None
         self._vector = fem.Function(continuum.space)
         self._evaluate: Callable[[], Array] = self._assembled
@@ -202,7 +205,7 @@ class InternalForces:
         why = "the faster one: " + ", ".join(f"{k} {1e3 * s:.3g} ms" for k, s in seconds.items())
         self.choice = OperatorChoice(faster, why, seconds)
         if faster == "assembly":
-            self._matrix = None
+            self.forget_stiffness()
 
     def stiffness(self) -> sp.csr_matrix:
         """Linear elastic stiffness at zero strain, of the owned rows; collective.
@@ -226,10 +229,14 @@ class InternalForces:
 
     def forget_stiffness(self) -> None:
         """Free the memory of :meth:`stiffness`, which is assembled again where it is needed."""
-        self._matrix = None
+        self._matrix = self._blocks = None
 
     def _product(self) -> Array:
-        return np.asarray(self.stiffness() @ self.columns())
+        if self._blocks is None:
+            continuum = self.continuum
+            size = continuum.layout.n_unknowns
+            self._blocks = fast_product(self.stiffness(), size, continuum.comm)
+        return self._blocks(self.columns())
 
     def _compile(self) -> None:
         if self._form is None:

@@ -21,6 +21,7 @@ from itertools import pairwise
 import numpy as np
 
 from fxcrack.base.arrays import Array
+from fxcrack.base.checks import as_float, finite, keep_floats, number, positive, shown
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.lay_up import angles_of
 from fxcrack.continuum.materials import Frame, Material, directions, frame_axes, strain_rotation
@@ -56,13 +57,9 @@ class Ply:
     def __post_init__(self) -> None:
         """Check the numbers."""
         for name in ("thickness", "angle"):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int | float | np.number):
-                raise InputError(f"Ply: {name} = {value!r} is not a number; give one")
-            if not np.isfinite(value):
-                raise InputError(f"Ply: {name} = {value} must be finite")
-        if self.thickness <= 0.0:
-            raise InputError(f"Ply: thickness = {self.thickness} must be positive")
+            finite("Ply", **{name: getattr(self, name)})
+        positive("Ply", thickness=self.thickness)
+        keep_floats(self, "thickness", "angle")
 
     def stiffness(self) -> Array:
         """Stiffness in the axes of the laminate, shape (6, 6), force/length^2."""
@@ -134,10 +131,10 @@ class Laminate:
         given: list[Ply | float]
         if isinstance(plies, str):
             given = list(angles_of(plies))
-        elif isinstance(plies, Ply) or not isinstance(plies, Iterable):
+        elif isinstance(plies, Ply | bytes) or not _lists(plies):
             raise InputError(
-                f"Laminate: plies = {plies!r} must be a list of plies or angles, bottom first, or "
-                "a lay-up such as '[0/90]s'"
+                f"Laminate: plies = {shown(plies)} must be a list of plies or angles, bottom "
+                "first, or a lay-up such as '[0/90]s'"
             )
         else:
             given = list(plies)
@@ -454,29 +451,34 @@ class Laminate:
         return strain_rotation(frame_axes("Laminate", self.frame))
 
 
+def _lists(plies: object) -> bool:
+    """Whether something lists plies; an array of numpy without a dimension does not."""
+    return isinstance(plies, Iterable) and not (isinstance(plies, np.ndarray) and plies.ndim == 0)
+
+
 def _as_ply(i: int, given: Ply | float, material: Material | None, thickness: float | None) -> Ply:
     """A ply with its material."""
     if isinstance(given, Ply):
         ply = given if given.material is not None else replace(given, material=material)
-    elif isinstance(given, bool) or not isinstance(given, int | float | np.number):
+    elif as_float(given) is None:
         raise InputError(
-            f"Laminate: plies[{i}] = {given!r} is neither a Ply nor an angle in degrees"
+            f"Laminate: plies[{i}] = {shown(given)} is neither a Ply nor an angle in degrees"
         )
     elif thickness is None:
         raise InputError(
-            f"Laminate: plies[{i}] = {given!r} is an angle; give thickness=, that of one ply, "
+            f"Laminate: plies[{i}] = {given} is an angle; give thickness=, that of one ply, "
             "or Ply(thickness, angle)"
         )
     else:
-        ply = Ply(thickness, float(given), material)
+        ply = Ply(thickness, number("Laminate", f"plies[{i}]", given), material)
     if ply.material is None:
         raise InputError(
             f"Laminate: plies[{i}] has no material; give material= to the ply or to the laminate"
         )
     if isinstance(ply.material, type) or not hasattr(ply.material, "stiffness"):
         raise InputError(
-            f"Laminate: the material of plies[{i}], {ply.material!r}, is not a material; give e.g. "
-            "Orthotropic(E=..., nu=..., G=...)"
+            f"Laminate: the material of plies[{i}], {shown(ply.material)}, is not a material; "
+            "give e.g. Orthotropic(E=..., nu=..., G=...)"
         )
     if hasattr(ply.material, "form") or isinstance(ply.material, ByTemperature | Laminate):
         raise InputError(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import one_of
+from fxcrack.base.checks import number_or_function, one_of, text
 from fxcrack.base.errors import InputError
 from fxcrack.base.positions import numbers_at
 from fxcrack.continuum.amplitudes import AmplitudeLike, Ramp
@@ -28,6 +28,11 @@ class Clamp:
     where: str
     name: str | None = None
     amplitude: AmplitudeLike = _RAMP
+
+    def __post_init__(self) -> None:
+        """Check the names."""
+        text("Clamp", "where", self.where)
+        text(f"Clamp('{self.where}')", "name", self.name, optional=True)
 
     @property
     def title(self) -> str:
@@ -54,7 +59,10 @@ class Symmetry:
 
     def __post_init__(self) -> None:
         """Check the axis."""
-        one_of(f"Symmetry('{self.where}')", "axis", self.axis, ("x", "y", "z"))
+        text("Symmetry", "where", self.where)
+        owner = f"Symmetry('{self.where}')"
+        text(owner, "name", self.name, optional=True)
+        one_of(owner, "axis", self.axis, ("x", "y", "z"))
 
     @property
     def title(self) -> str:
@@ -89,6 +97,12 @@ class Rotation:
 
     def __post_init__(self) -> None:
         """Refuse a support that supports nothing."""
+        text("Rotation", "where", self.where)
+        owner = f"Rotation('{self.where}')"
+        text(owner, "name", self.name, optional=True)
+        for axis in ("x", "y", "z"):
+            if getattr(self, axis) is not None:
+                number_or_function(owner, axis, getattr(self, axis))
         if self.x is None and self.y is None and self.z is None:
             raise InputError(
                 f"Rotation('{self.where}') prescribes nothing; give x, y or z (0.0 holds it)"

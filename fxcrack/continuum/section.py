@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import positive
+from fxcrack.base.checks import finite, keep, keep_floats, list_of, numbers, positive, shown
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.laminate import Laminate, Ply
 
@@ -59,32 +59,33 @@ class Section:
                 )
         elif isinstance(self.material, type) or not hasattr(self.material, "stiffness"):
             raise InputError(
-                f"Section: {self.material!r} is not a material; give one, e.g. Isotropic(E=70e3, "
-                "nu=0.3), or a Laminate"
+                f"Section: {shown(self.material)} is not a material; give one, e.g. "
+                "Isotropic(E=70e3, nu=0.3), or a Laminate"
             )
         elif self.thickness is None:
             raise InputError("Section: a section of one material needs thickness=...")
         else:
             positive("Section", thickness=self.thickness)
         _ = self.laminate  # refuses materials that are not linear elastic
-        if not np.isfinite(self.offset):
-            raise InputError(f"Section: offset = {self.offset} must be finite")
+        finite("Section", offset=self.offset)
         for name in ("axis", "up"):
-            value = getattr(self, name)
-            if value is not None and not (
-                np.shape(value) == (3,) and np.all(np.isfinite(value)) and np.any(value)
-            ):
-                raise InputError(
-                    f"Section: {name} = {value!r} must be a direction, three numbers of which "
-                    "one is not zero"
-                )
-        factor = self.shear_factor
-        if factor is not None and not (
-            np.shape(factor) in ((), (2,)) and np.all(np.asarray(factor) > 0.0)
-        ):
-            raise InputError(
-                f"Section: shear_factor = {factor} must be a positive number, or two of them"
-            )
+            if name == "axis" or self.up is not None:
+                direction = numbers("Section", name, getattr(self, name), 3, words="a direction")
+                if not any(direction):
+                    raise InputError(f"Section: {name} = {direction} has no direction")
+                keep(self, **{name: direction})
+        keep_floats(self, "thickness", "offset")
+        given = self.shear_factor
+        if given is None:
+            return
+        if list_of(given) is None:
+            positive("Section", shear_factor=given)
+            keep_floats(self, "shear_factor")
+        else:
+            factors = numbers("Section", "shear_factor", given, 2, words="those of 13 and 23")
+            for i, value in enumerate(factors):
+                positive("Section", **{f"shear_factor[{i}]": value})
+            keep(self, shear_factor=factors)
 
     @property
     def laminate(self) -> Laminate:

@@ -27,7 +27,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import positive, table, whole
+from fxcrack.base.checks import is_count, positive, shown, table, whole
 from fxcrack.base.errors import InputError
 
 Driver = Literal["once", "increments", "time", "opening"]
@@ -174,8 +174,10 @@ class ProgressiveRelease(ReleaseLaw):
 
     def __post_init__(self) -> None:
         """Check the zone."""
-        if self.zone not in (1, 2):
-            raise InputError(f"ProgressiveRelease: zone = {self.zone!r}: choose 1 or 2 elements")
+        if not is_count(self.zone) or self.zone not in (1, 2):
+            raise InputError(
+                f"ProgressiveRelease: zone = {shown(self.zone)}: choose 1 or 2 elements"
+            )
 
     @property
     def onset(self) -> float:

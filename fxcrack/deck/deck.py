@@ -9,6 +9,7 @@ from typing import Any, cast
 from mpi4py import MPI
 
 from fxcrack.base import log
+from fxcrack.base.checks import communicator, file_path
 from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.deck.cards import DeckError
 from fxcrack.deck.explicit import SAFETY
@@ -132,8 +133,10 @@ def read_deck(
         DeckError: The deck cannot be read, or asks for what fxcrack does not have.
         InputError: The scene it describes contradicts itself.
     """
-    found = on_root(comm, lambda: translated(Path(path), order), DeckError)
-    return _made(found, Path(path), comm, say=True)
+    path = file_path("read_deck", "path", path)
+    communicator("read_deck", comm)
+    found = on_root(comm, lambda: translated(path, order), DeckError)
+    return _made(found, path, comm, say=True)
 
 
 def _made(found: Translated | None, path: Path, comm: MPI.Intracomm, *, say: bool) -> Deck:

@@ -40,9 +40,11 @@ _SPREAD = 0.02
 """Where dissipation is small, the two ways to compute it may differ by this fraction of it."""
 _LEVEL = 1e-4
 """... or by this fraction of the energy of the block."""
-_LOST = 1e-7
+_LOST = 1e-9
 """Work of pressure on openings in an increment in 3-D, as a fraction of the energy of the block:
 contact that changes on the way has some, which is missing from the balance."""
+_AT_EVENT = 1e-9
+"""Changes of contact nearer to the end of an increment than this fraction of it are at its end."""
 _TRIES = 20
 """Trials to end an increment where contact changes; the estimate of that place is linear."""
 
@@ -248,7 +250,7 @@ class _Way:
         gap0, gap1 = self.jump[:, 0] + block.gap, kept[:, 0] + block.gap
         with np.errstate(divide="ignore", invalid="ignore"):
             way = np.where(closed, p0[:, 0] / (p0[:, 0] - p1[:, 0]), gap0 / (gap0 - gap1))
-        return float(way[(way > 0.1) & (way < 0.9999)].min(initial=0.5))
+        return float(way[(way > 0.1) & (way < 1.0 - _AT_EVENT)].min(initial=0.5))
 
 
 __all__ = ["follow"]

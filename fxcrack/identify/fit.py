@@ -297,6 +297,8 @@ def _parameters(
     names = list(start)
     x0 = np.array([number("fit: start", name, start[name]) for name in names])
     low, high = np.zeros(len(names)), np.full(len(names), np.inf)
+    if bounds is not None and not isinstance(bounds, Mapping):
+        raise InputError(f"fit: bounds = {shown(bounds)} must be like {{'GIc': (0.1, 0.4)}}")
     for name, pair in ({} if bounds is None else bounds).items():
         if name not in names:
             raise InputError(f"fit: bounds of '{name}', which is not in start: {', '.join(names)}")

@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
-from fxcrack.base.checks import keep, numbers, text
+from fxcrack.base.checks import file_path, keep, numbers, text
 from fxcrack.base.errors import InputError, unknown_name
 
 UNLOADED = 0.02
@@ -151,7 +151,10 @@ def read_record(
         InputError: The file cannot be read, a column is missing, or a line has more values than
             there are columns or no number where one is needed; the message names the line.
     """
-    path = Path(path)
+    path = file_path("read_record", "path", path)
+    for argument, given in (("opening", opening), ("load", load)):
+        text("read_record", argument, given)
+    text("read_record", "crack_length", crack_length, optional=True)
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:

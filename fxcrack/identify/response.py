@@ -267,6 +267,8 @@ def curve_of(history: History, axes: Axes) -> Curve:
     Raises:
         InputError: A column is missing, or the crack did not grow.
     """
+    check_instance("curve_of", "history", history, History, "scene.history")
+    check_instance("curve_of", "axes", axes, Axes, "Axes('u[tip]', 'R[tip]')")
     opening, load = axes.of(history)
     event = history["event"]
     released = sum(

@@ -36,6 +36,7 @@ from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supported_slaves import align_frames, check_slaves
 from fxcrack.interface.supports import Supports
+from fxcrack.interface.surface import FacetSurface
 
 
 @dataclass(frozen=True)
@@ -63,6 +64,8 @@ class LumpedInterface:
         pairs: Interfaces.
         supports: Prescribed components.
         mass: Mass of the owned dofs, shape (n_local,).
+        masters: Master surfaces per pair that open nodes may be paired with anew; ``None`` where
+            they stay as they are, as all do by default.
 
     Raises:
         InterfaceError: A support holds a bonded slave but not its masters alike, a node is a slave
@@ -76,6 +79,7 @@ class LumpedInterface:
         row_of: Row of each slave node per pair, -1 where it has no jump, shape (n_slaves,).
         jumped: Per pair, the slave nodes that have a jump, shape (n_slaves,).
         slave: Interface node of each row's slave, shape (n_rows,).
+        paired: Whether each row has a master at present, shape (n_rows,).
         simple: Whether every slave has one master of its own.
         frames: Frame of each row, columns normal and tangents, shape (n_rows, gdim, gdim).
         held: Components of these frames that supports hold, shape (n_rows, gdim).
@@ -96,11 +100,18 @@ class LumpedInterface:
     """
 
     def __init__(
-        self, layout: DofLayout, pairs: Sequence[Pair], supports: Supports, mass: Array
-    ) -> None:
+        self, layout: DofLayout, pairs: Sequence[Pair], supports: Supports, mass: Array,
+        masters: Sequence[FacetSurface | None] = (),
+    ) -> None:  # fmt: skip
         gdim = layout.gdim
         self.jumped = [p.paired.copy() for p in pairs]
-        self.nodes = nodes = InterfaceNodes.of_pairs(layout, pairs, jumped=self.jumped)
+        moving = [p for p, m in enumerate(masters) if m is not None]
+        for p in moving:
+            self.jumped[p] |= ~pairs[p].bonded  # they may come to a master later
+        self.nodes = nodes = InterfaceNodes.of_pairs(
+            layout, pairs, [m for m in masters if m is not None], self.jumped,
+            _joined([pairs[p].surface.dofs for p in moving]),
+        )  # fmt: skip
         which, value = supports.at_nodes(nodes)
         self.which, self.value = which[:, :gdim], value[:, :gdim]
         check_slaves(pairs, self.jumped, nodes, which, value, supports)
@@ -148,8 +159,11 @@ class LumpedInterface:
         :meth:`set_ties` must follow.
         """
         n, row, column, weight = len(self.nodes), [], [], []
+        self.paired = np.ones(self.n_rows, dtype=bool)
+        self._partner: Ints | None = None
         for pair, rows in zip(pairs, self.row_of, strict=True):
             has = rows >= 0
+            self.paired[rows[has]] = pair.paired[has]
             weights, masters = pair.weights[has], self.nodes.find(pair.masters[has])
             row.append(np.repeat(rows[has], weights.shape[1]))
             column.append(masters.ravel())
@@ -229,7 +243,7 @@ class LumpedInterface:
     def _accelerate_pairs(self) -> None:
         """Accelerations where every slave has one master of its own: both of a tied pair share."""
         n, gdim = self.which.shape
-        if not hasattr(self, "_partner"):
+        if self._partner is None:
             assert self.master is not None
             self._partner = np.arange(n)
             self._partner[self.slave], self._partner[self.master] = self.master, self.slave

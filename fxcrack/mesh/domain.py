@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from fxcrack.base.checks import check_instance, text
+
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.la
 import dolfinx.mesh
@@ -94,6 +96,12 @@ def from_dolfinx(
     Example:
         ``from_dolfinx(domain, facet_tags=tags, names={"left": (1, 3), "right": (1, 4)})``
     """
+    check_instance("from_dolfinx", "domain", domain, dolfinx.mesh.Mesh, "create_rectangle(...)")
+    text("from_dolfinx", "name", name)
+    for argument, given in (("cell_tags", cell_tags), ("facet_tags", facet_tags)):
+        if given is not None:
+            what = dolfinx.mesh.MeshTags
+            check_instance("from_dolfinx", argument, given, what, "meshtags(...)")
     comm = compat.plain_comm(domain.comm)
     tdim = domain.topology.dim
     tags = {tdim: cell_tags, tdim - 1: facet_tags}

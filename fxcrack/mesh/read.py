@@ -12,7 +12,7 @@ from typing import Any
 
 from mpi4py import MPI
 
-from fxcrack.base.checks import check_list
+from fxcrack.base.checks import check_list, communicator, file_path, text
 from fxcrack.base.errors import MeshError
 from fxcrack.base.together import check_same_call
 from fxcrack.mesh.distribute import distribute
@@ -48,7 +48,8 @@ def read_mesh(
     Raises:
         MeshError: The file is missing or of another kind, or as :func:`mesh_from_gmsh`.
     """
-    path = Path(path)
+    path = file_path("read_mesh", "path", path)
+    communicator("read_mesh", comm)
     split = check_list("read_mesh", "split", split, Split)
     check_same_call(comm, f"read_mesh('{path.name}')", {"path": path, "gdim": gdim, "split": split})
 
@@ -96,6 +97,8 @@ def mesh_from_gmsh(
             z = 0, coordinates that are not numbers, degenerate cells, a name used in two
             dimensions, a group without elements or off the cells, a surface that cannot be split.
     """
+    communicator("mesh_from_gmsh", comm)
+    text("mesh_from_gmsh", "name", name)
     split = check_list("mesh_from_gmsh", "split", split, Split)
     check_same_call(comm, f"mesh_from_gmsh('{name}')", {"name": name, "gdim": gdim, "split": split})
 

@@ -13,7 +13,7 @@ import dolfinx.plot
 import numpy as np
 from dolfinx import fem
 
-from fxcrack.base.checks import whole
+from fxcrack.base.checks import file_path, whole
 from fxcrack.base.errors import InputError
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -174,7 +174,7 @@ class FieldSeries:
         events: tuple[str, ...] = ("start", "increment", "release"),
         every: int = 1,
     ) -> None:
-        self.path = Path(path)
+        self.path = file_path("FieldSeries", "path", path)
         if self.path.suffix != ".pvd":
             raise InputError(f"fields are written to a .pvd file, not to '{path}'")
         every = whole("FieldSeries", "every", every)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.checks import text
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.front_order import ordered_fronts
@@ -57,7 +58,8 @@ def front_lines(source: Analysis | HasAnalysis, interface: Interface | str) -> l
     """
     analysis = analysis_of(source)
     analysis.check_started("its front")
-    title = interface if isinstance(interface, str) else interface.title
+    title = interface.title if isinstance(interface, Interface) else interface
+    text("front_lines", "interface", title)
     crack = next((g for g in analysis.cracks if g.title == title), None)
     if crack is None:
         unknown_name("debond of interface", title, [g.title for g in analysis.cracks])

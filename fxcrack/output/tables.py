@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.checks import is_function, shown
+from fxcrack.base.checks import file_path, is_function, shown, text
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -102,6 +102,7 @@ class BondHistory:
         where: Callable[[Array], npt.NDArray[np.bool_]] | None = None,
     ) -> None:
         self._analysis = analysis_of(source)
+        text("BondHistory", "interface", interface)
         titles = [debond.interface.title for debond in self._analysis.debonds]
         if interface not in titles:
             unknown_name("debond of interface", interface, titles)
@@ -146,6 +147,7 @@ def write_releases(source: Analysis | HasAnalysis, path: str | Path) -> None:
 def write_rows(analysis: Analysis, path: str | Path, rows: list[Row]) -> None:
     """Write rows of the same columns; collective, rank 0 writes."""
     comm = analysis.comm
+    path = file_path("the table", "path", path)
     with all_or_none(comm, f"writing {path}"):
         if comm.rank == 0:
             with replacing(path) as temporary, temporary.open("w", newline="") as stream:
@@ -188,6 +190,7 @@ def tip_table(source: Analysis | HasAnalysis) -> str:
 def write_tip_table(source: Analysis | HasAnalysis, path: str | Path) -> None:
     """Write :func:`tip_table`; collective."""
     text, comm = tip_table(source), analysis_of(source).comm
+    path = file_path("write_tip_table", "path", path)
     with all_or_none(comm, f"writing {path}"):
         if comm.rank == 0:
             with replacing(path) as temporary:

@@ -177,17 +177,30 @@ class PairingEnergy:
         self.forget()
         self._before = forces
 
-    def book(self, forces: PETSc.Vec, step: PETSc.Vec, work: IncrementWork, n_forces: int) -> None:
-        """Add the energy of the pairing, by the trapezoidal rule; collective.
+    def book(
+        self,
+        forces: PETSc.Vec,
+        middle: PETSc.Vec | None,
+        step: PETSc.Vec,
+        work: IncrementWork,
+        n_forces: int,
+    ) -> None:
+        """Add the energy of the pairing, by Simpson's rule or the trapezoidal one; collective.
 
         Args:
             forces: Forces of interfaces and supports after it; destroyed.
+            middle: Those in half of the displacement, which elastic bodies have at any speed;
+                destroyed. ``None`` for the trapezoidal rule.
             step: Change of the displacement.
             work: Work along the increment.
             n_forces: Number of force patterns.
         """
         forces.axpy(1.0, self._before)
-        given = 0.5 * float(forces.dot(step)) - work.support_work(n_forces)
+        done = 0.5 * float(forces.dot(step))
+        if middle is not None:
+            done = (done + 2.0 * float(middle.dot(step))) / 3.0
+            middle.destroy()
+        given = done - work.support_work(n_forces)
         self.energy -= given + work.bonds + work.friction + work.contact
         forces.destroy()
         self.forget()

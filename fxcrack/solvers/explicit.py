@@ -46,10 +46,11 @@ from fxcrack.solvers.explicit_accounts import EnergyAccounts
 from fxcrack.solvers.explicit_bodies import BodyMotion
 from fxcrack.solvers.explicit_energies import MotionEnergies, sums_over_ranks
 from fxcrack.solvers.explicit_further import FurtherForces
+from fxcrack.solvers.explicit_ghosts import GhostMotion
 from fxcrack.solvers.explicit_interface import dynamics_of
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
-from fxcrack.solvers.explicit_moving import MovingInterfaces
+from fxcrack.solvers.explicit_moving import MovingInterfaces, sliding_masters
 from fxcrack.solvers.explicit_outer import OuterForces
 from fxcrack.solvers.explicit_points import FacePoints
 from fxcrack.solvers.explicit_present import PresentInterface
@@ -129,13 +130,17 @@ class ExplicitSolver:
         self.energies = MotionEnergies(self.comm)
         self.monitored: list[float] = []
         self._patterns = LoadsAndMonitors(continuum, loads, monitors, points)
-        self.lumped = LumpedInterface(continuum.layout, pairs, supports, self.mass.values)
+        self._masters = sliding_masters(continuum, pairs, finite=self.bodies.finite)
+        self.lumped = LumpedInterface(
+            continuum.layout, pairs, supports, self.mass.values, self._masters
+        )
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
         self._owned = self.bodies.u.x.array[: continuum.n_local]  # displacement of the owned dofs
         chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
-        self.motion = BodyMotion(self.bodies, chosen)
+        self._ghosts = ghosts = GhostMotion(continuum, self.bodies.u, self._at_interface)
+        self.motion = BodyMotion(self.bodies, chosen, ghosts.dofs)
         damping = float(effect.rayleigh[0])
         self._outer = OuterForces(
             self._patterns, self.further, self.mass, damping, chosen, self.energies
@@ -159,7 +164,7 @@ class ExplicitSolver:
         self.row_of = lumped.row_of
         self.frames, self.held_by_supports = lumped.pair_frames, lumped.pair_held
         self.dynamics = dynamics_of(lumped, self.pairs, self.fronts, self.continuum)
-        self._moving = MovingInterfaces(self.dynamics, self.pairs, self.fronts)
+        self._moving = MovingInterfaces(self.dynamics, self.pairs, self.fronts, self._masters)
         self._mine = nodes.mine
         layout = self.continuum.layout
         self._at_interface = layout.dof(nodes.local[:, None], np.arange(gdim)).ravel()
@@ -215,7 +220,7 @@ class ExplicitSolver:
         self.dynamics.set_ties(lumped.tied)
 
     def follow_bodies(self) -> None:
-        """Take front geometry and contact normals of bodies that move far; collective."""
+        """Take front geometry, contact normals and pairs of bodies that move far; collective."""
         self._moving.follow()
 
     def renew_stable_increment(self) -> float:
@@ -322,12 +327,15 @@ class ExplicitSolver:
         if dynamics.elastic.exist and dt != self.last_dt:
             self._interface_before, self._jumps_before = dynamics.v.copy(), dynamics.gap
         outer.damp(v, h)
-        self.motion.add_change(v)
         outer.push(v, h)
+        self.motion.change_first(v)
         dynamics.advance(h, dt)
         v[prescribed.dofs] = given
         if whole and len(at):
             v[at] = dynamics.v[mine].ravel()
+        # what neighbours need is on its way during the product
+        self._ghosts.start(v, dt, dynamics.u[mine])
+        self.motion.change_others(v)
         power = float(reactions @ (old + prescribed.motion(v, dynamics.v)))
         if whole:
             power += outer.power(before, v, h)
@@ -339,8 +347,7 @@ class ExplicitSolver:
         add_multiple(u, dt, v)
         if len(at):
             u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
-        if self.comm.size > 1:
-            self.bodies.u.x.scatter_forward()
+        self._ghosts.finish()
         self.at += dt
         self.last_dt = dt
         self.increments += 1
@@ -448,6 +455,10 @@ class ExplicitSolver:
         """
         self.record_state()
         out = self._files.arrays(self.remember()) | {"loads": self.state.loads}
+        if self.bodies.finite:
+            out |= self._moving.arrays() | {"stable": np.array([self.stable])}
+            out["highest"] = self._files.gather(self.stability.highest)
+            out["looked"] = self._files.gather(self.stability.looked)
         return out | self._present.arrays(self.fronts, self.state.jump)
 
     def resume(self, arrays: Arrays, time: float) -> None:
@@ -465,6 +476,12 @@ class ExplicitSolver:
             gone = front.bonded & ~arrays[f"bonded[{p}]"].astype(bool)
             if gone.any():
                 front.release(np.flatnonzero(gone))
+        if "highest" in arrays:
+            self._moving.restore(arrays)
+            scatter = self._files.scatter
+            self.stability.restore(
+                scatter(arrays["highest"]), float(arrays["stable"][0]), scatter(arrays["looked"])
+            )
         self.recall(self._files.snapshot(arrays))
 
     # -- what criteria and output ask ----------------------------------------------------

@@ -1,44 +1,155 @@
-"""Interfaces of bodies that move far, in explicit dynamics: fronts and faces follow."""
+"""Interfaces of bodies that move far, in explicit dynamics: fronts, faces and pairs follow."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-from fxcrack.base.arrays import Ints
+import numpy as np
+import numpy.typing as npt
+
+from fxcrack.base.arrays import Bools
+from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.face import Face
+from fxcrack.interface.finite_sliding import changing, renewed, with_changing
 from fxcrack.interface.front import Front
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.pairing import local_frames
+from fxcrack.interface.surface import FacetSurface, gather_surface
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
+
+_TURNED = 0.2
+"""Angle by which the normal of faces far from each other may turn before they are paired anew."""
+
+
+def sliding_masters(
+    continuum: Continuum, pairs: Sequence[Pair], *, finite: bool
+) -> list[FacetSurface | None]:
+    """Undeformed master surfaces of the pairs whose open nodes are paired anew; collective.
+
+    Args:
+        continuum: The bodies.
+        pairs: Interfaces.
+        finite: Whether the bodies turn and stretch by any amount.
+
+    Returns:
+        ``None`` for pairs that stay as they are.
+    """
+    out: list[FacetSurface | None] = []
+    for pair in pairs:
+        master = pair.sides[1]
+        # a rigid surface has no nodes
+        if finite and pair.interface.contact and isinstance(master, str | Face):
+            out.append(gather_surface(continuum, master))
+        else:
+            out.append(None)
+    return out
 
 
 class MovingInterfaces:
-    """Front geometry and contact normals where the bodies are now.
+    """Front geometry, contact normals and pairs where the bodies are now.
 
     Args:
         dynamics: Motion of the interfaces.
-        pairs: Interfaces.
+        pairs: Interfaces; replaced in this list where nodes are paired anew.
         fronts: Their fronts.
+        masters: From :func:`sliding_masters`.
     """
 
     def __init__(
-        self, dynamics: InterfaceDynamics, pairs: Sequence[Pair], fronts: Sequence[Front]
-    ) -> None:
+        self, dynamics: InterfaceDynamics, pairs: list[Pair], fronts: Sequence[Front],
+        masters: Sequence[FacetSurface | None],
+    ) -> None:  # fmt: skip
         self._dynamics, self._pairs, self._fronts = dynamics, pairs, fronts
-        self._row_of: Sequence[Ints] = dynamics.lumped.row_of
+        self._masters, lumped = masters, dynamics.lumped
+        # nodes of the surfaces that are paired anew: slaves, masters
+        self._nodes = [
+            None
+            if master is None
+            else (lumped.nodes.find(pair.surface.dofs), lumped.nodes.find(master.dofs))
+            for pair, master in zip(pairs, masters, strict=True)
+        ]
 
     def follow(self) -> None:
-        """Take front geometry and contact normals from the present displacement."""
+        """Take front geometry, contact normals and pairs from the present displacement."""
         dynamics, lumped = self._dynamics, self._dynamics.lumped
-        gdim = lumped.frames.shape[-1]
-        for pair, front, rows in zip(self._pairs, self._fronts, self._row_of, strict=True):
-            x = pair.surface.x.copy()
+        gdim, changed = lumped.frames.shape[-1], False
+        for p, (front, rows) in enumerate(zip(self._fronts, lumped.row_of, strict=True)):
+            x = self._pairs[p].surface.x.copy()
             has = rows >= 0
             x[has, :gdim] += dynamics.u[lumped.slave[rows[has]]]
             front.follow(x)
             frames = local_frames(-front.surface.normals, gdim)
-            lumped.frames[rows[has]] = frames[has]
+            turn = has
+            if self._masters[p] is not None:
+                # open pairs keep the normal that their gap was found with
+                turn = has & (self._held(p) | ~self._pairs[p].paired)
+                changed |= self._pair_anew(p)
+            lumped.frames[rows[turn]] = frames[turn]
+        if changed:
+            lumped.set_pairing(self._pairs)
+            dynamics.set_ties(lumped.tied)
+            return
         lumped.version += 1
         dynamics.set_frames()
 
+    def _held(self, p: int) -> Bools:
+        """Slave nodes of a pair whose bonds hold, or still pull, shape (n_nodes,)."""
+        rows, dynamics = self._dynamics.lumped.row_of[p], self._dynamics
+        pulling = dynamics.bonds.active.copy()
+        for fading in dynamics.fading:
+            pulling[fading.rows] = True
+        return np.asarray(self._fronts[p].bonded | ((rows >= 0) & pulling[rows]))
 
-__all__ = ["MovingInterfaces"]
+    def _pair_anew(self, p: int) -> bool:
+        """Pair the open nodes with the master surface where it is now; whether any changed."""
+        master, nodes, pair = self._masters[p], self._nodes[p], self._pairs[p]
+        assert master is not None and nodes is not None
+        lumped, u, held = self._dynamics.lumped, self._dynamics.u, self._held(p)
+        new = renewed(pair, held, master, u[nodes[0]], u[nodes[1]], turned=_TURNED)
+        if new is None:
+            return False
+        self._pairs[p] = new
+        rows = lumped.row_of[p]
+        loose = (rows >= 0) & ~held & new.paired
+        at, normal = rows[loose], new.frames[loose][:, :, 0]
+        lumped.frames[at] = new.frames[loose]
+        masters = lumped.nodes.find(new.masters[loose])
+        jump = u[lumped.slave[at]] - np.einsum("nk,nkc->nc", new.weights[loose], u[masters])
+        gap = np.einsum("nc,nc->n", jump, normal) + new.gap[loose]
+        # faces that overlap by the change of their facets alone are not pushed apart at once
+        lumped.gap[at] = new.gap[loose] - np.minimum(gap, 0.0)
+        return True
+
+    # -- checkpoints ---------------------------------------------------------------------
+
+    def arrays(self) -> dict[str, npt.NDArray[Any]]:
+        """Pairs and gaps that are other ones than at the start, on any number of ranks."""
+        out: dict[str, npt.NDArray[Any]] = {}
+        for p, (pair, master) in enumerate(zip(self._pairs, self._masters, strict=True)):
+            if master is not None:
+                out |= {f"pairing.{k}[{p}]": v for k, v in changing(pair, master).items()}
+        if out:
+            lumped = self._dynamics.lumped
+            out |= {"pairing.row_gap": lumped.gap, "pairing.row_frames": lumped.frames}
+        return out
+
+    def restore(self, arrays: Mapping[str, npt.NDArray[Any]]) -> None:
+        """Take what :meth:`arrays` gave, and the ties with them."""
+        lumped = self._dynamics.lumped
+        if "pairing.row_gap" not in arrays:
+            return
+        for p, master in enumerate(self._masters):
+            if master is None:
+                continue
+            known = {
+                k: arrays[f"pairing.{k}[{p}]"] for k in changing(self._pairs[p], master)
+            }  # fmt: skip
+            self._pairs[p] = with_changing(self._pairs[p], master, known)
+        lumped.gap[:] = np.asarray(arrays["pairing.row_gap"], dtype=float)
+        lumped.frames[:] = np.asarray(arrays["pairing.row_frames"], dtype=float)
+        lumped.set_pairing(self._pairs)
+        self._dynamics.set_ties(lumped.tied)
+
+
+__all__ = ["MovingInterfaces", "sliding_masters"]

@@ -88,7 +88,7 @@ class OpenPairs:
         scale = self._compliance.max(initial=0.0)
         # prescribed on all sides along the normal: no force could keep such a pair apart
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
-        may_touch &= ~springs[rows]
+        may_touch &= ~springs[rows] & lumped.paired[rows]
         self._may_touch = np.flatnonzero(may_touch)
         self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
         self._has_gap = bool(np.any(lumped.gap[rows]))

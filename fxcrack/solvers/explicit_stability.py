@@ -6,6 +6,7 @@ Bodies, bonds with a stiffness of their own and bulk viscosity do; exact bonds a
 from __future__ import annotations
 
 import numpy as np
+from mpi4py import MPI
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
@@ -36,6 +37,9 @@ class Stability:
         dynamics: Their interfaces.
         further: Where the bulk viscosity of a step is put.
         at_interface: Owned dofs of the interface nodes of this rank, shape (n,).
+
+    Attributes:
+        looked: Displacement at the last look, owned dofs, shape (n_local,), length.
     """
 
     def __init__(
@@ -44,6 +48,10 @@ class Stability:
     ) -> None:  # fmt: skip
         self._bodies, self._dynamics, self._further = bodies, dynamics, further
         self._at_interface = at_interface
+        self.looked = np.zeros(0)
+        self._known: tuple[Array, float] | None = None
+        self._edges: tuple[Ints, Ints, Array] | None = None
+        self._edges_then = np.zeros(0)
 
     def take_viscosity(self, options: ExplicitOptions, effect: Inertia) -> bool:
         """Make the bulk viscosity that a step asks for; whether there is any; collective.
@@ -85,15 +93,68 @@ class Stability:
         continuum = self._bodies.continuum
         places = continuum.positions()[: continuum.layout.n_owned]
         start = start_vector(places, continuum.layout.n_unknowns)
-        self._highest = HighestFrequency(continuum.comm, mass, start)
         self._damping = HighestFrequency(continuum.comm, mass, start)
+        known, self._known = self._known, None
+        if known is not None:
+            self._highest = HighestFrequency(continuum.comm, mass, known[0])
+            return known[1]
+        self._highest = HighestFrequency(continuum.comm, mass, start)
         return self._by(STEPS, velocity)
+
+    @property
+    def highest(self) -> Array:
+        """The vector that the highest mode is seen in, owned dofs, shape (n_local,)."""
+        return self._highest.vector
 
     def again(self, velocity: Array) -> float:
         """The same with the present tangent and velocity, by a few more steps; collective."""
         return self._by(_AGAIN, velocity)
 
+    def restore(self, highest: Array, stable: float, looked: Array) -> None:
+        """Take a look before a checkpoint, which the next :meth:`find` gives again; collective.
+
+        Args:
+            highest: As :attr:`highest`.
+            stable: What it found, time.
+            looked: As :attr:`looked`.
+        """
+        x = self._bodies.u.x
+        now = x.array.copy()
+        x.array[: len(looked)] = looked
+        x.scatter_forward()
+        self._look()
+        x.array[:] = now
+        self._known = highest, stable
+
+    def _look(self) -> None:
+        self.looked = self._bodies.u.x.array[: self._bodies.continuum.n_local].copy()
+        self._edges_then = self._edges_now()
+
+    def strained(self) -> float:
+        """Largest change of an edge since the last look, over its undeformed length; collective.
+
+        Edges lead from the first node of each cell to the others.
+        """
+        change = self._edges_now() - self._edges_then
+        largest = float(np.sqrt((change**2).sum(axis=1).max(initial=0.0)))
+        return float(self._bodies.continuum.comm.allreduce(largest, op=MPI.MAX))
+
+    def _edges_now(self) -> Array:
+        """Differences of the displacement along the edges over their lengths, (n_edges, gdim)."""
+        continuum = self._bodies.continuum
+        if self._edges is None:
+            cells = continuum.space.dofmap.list
+            first = np.repeat(cells[:, 0], cells.shape[1] - 1).astype(np.int64)
+            other, x = cells[:, 1:].ravel().astype(np.int64), continuum.positions()
+            lengths = np.linalg.norm(x[other] - x[first], axis=1)
+            self._edges = first, other, 1.0 / lengths
+        first, other, per_length = self._edges
+        u = self._bodies.u.x.array.reshape(-1, continuum.layout.n_unknowns)[:, : continuum.gdim]
+        return np.asarray((u[other] - u[first]) * per_length[:, None])
+
     def _by(self, steps: int, velocity: Array) -> float:
+        if self._bodies.finite:
+            self._look()
         omega, viscosity = self._highest(self._tangent_product, steps), self._further.viscosity
         rate = 0.0
         if viscosity is not None:

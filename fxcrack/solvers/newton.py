@@ -69,6 +69,8 @@ class NewtonSolver(InterfaceSolver):
         at: Time of the accepted state.
         counts: Solves and iterations so far.
         largest_force: Largest norm of the internal forces of an accepted state, force.
+        energy_noise: Work that the round-off of the bodies' forces may have done in an accepted
+            state at most, force times length.
         energy: What is stored in the accepted state.
         pairing: Energy that new pairings of faces that slide have taken.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
@@ -105,7 +107,7 @@ class NewtonSolver(InterfaceSolver):
         size = continuum.n_local, continuum.n_global
         self.u = PETSc.Vec().createMPI(size, comm=continuum.comm)
         self.at = 0.0
-        self.largest_force = 0.0
+        self.largest_force = self.energy_noise = 0.0
         self.energy = StoredEnergy(bodies)
         self.pairing = PairingEnergy()
         self.exact = self.free_start = False
@@ -282,13 +284,17 @@ class NewtonSolver(InterfaceSolver):
         trial.u.copy(self.u)
         self.at = trial.at
         self.largest_force = max(self.largest_force, self.tangent.force_scale)
+        noise = self.tangent.round_off * float(self.u.norm())
+        self.energy_noise = max(self.energy_noise, noise)
         self.tangent.drift = trial.drift
         self.tangent.accept()
         self.energy.accept(trial.energies)
         self.state = trial.end
         self._account.accept()
         if self.pairing.pending:
-            self.pairing.book(self.nodal_forces(self.u), step, trial.work, len(self.loads))
+            middle = self._forces_half_way(step) if self.bodies.closed else None
+            forces = self.nodal_forces(self.u)
+            self.pairing.book(forces, middle, step, trial.work, len(self.loads))
         step.destroy()
         inertia = self.bodies.inertia
         if self._begun:
@@ -299,6 +305,16 @@ class NewtonSolver(InterfaceSolver):
         if trial.work.contact:
             assert inertia is not None
             inertia.add_loss(trial.work.contact)
+
+    def _forces_half_way(self, step: PETSc.Vec) -> PETSc.Vec:
+        """Nodal forces half a step before the accepted state, where the bodies are afterwards."""
+        half = step.copy()
+        half.aypx(-0.5, self.u)
+        self.bodies.set(half)
+        forces = self.nodal_forces(half)
+        self.bodies.set(self.u)
+        half.destroy()
+        return forces
 
     def revert(self) -> None:
         """Reject the last trial; collective."""
@@ -377,9 +393,9 @@ class NewtonSolver(InterfaceSolver):
         """Find the equilibrium of a new pairing at constant loads, shape (n_retained,); collective.
 
         Contact forces move to the master points of the new pairing, and gaps that are not zero in
-        it close. The work of the interfaces on the way, by the trapezoidal rule, less what friction
-        and bonds take, goes to :attr:`pairing`. With inertia all that happens in the next
-        increment.
+        it close. The work of the interfaces on the way, by Simpson's rule in elastic bodies and by
+        the trapezoidal one in others, less what friction and bonds take, goes to :attr:`pairing`.
+        With inertia all that happens in the next increment.
 
         Returns:
             What :meth:`along` does for the way there; ``None`` with inertia.
@@ -450,8 +466,9 @@ class NewtonSolver(InterfaceSolver):
         """
         energy = self.energy
         sums = Sums(
-            self.pairing.energy, self.largest_force, energy.largest, self.tangent.drift, energy.most
-        )
+            self.pairing.energy, self.largest_force, energy.largest, self.tangent.drift,
+            energy.most, self.energy_noise,
+        )  # fmt: skip
         out = super().collect() | body_arrays(self.bodies, self.interfaces, sums)
         return out | tangent_arrays(self.tangent, self.system, self.face_loads)
 
@@ -474,6 +491,7 @@ class NewtonSolver(InterfaceSolver):
         self.at = time
         self.pairing.energy, self.largest_force = sums.pairing_energy, sums.largest_force
         self.energy.largest, self.energy.most = sums.largest_energy, sums.most_energy
+        self.energy_noise = sums.energy_noise
         super().resume(arrays, time)
         assert self._resumed is not None
         self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, sums.drift)
@@ -515,10 +533,6 @@ class NewtonSolver(InterfaceSolver):
         if self.interfaces.follow_sliding:
             spent["pairing_energy"] = self.pairing.energy
         return spent
-
-    def energy_round_off(self) -> float:
-        """Work of the round-off of the bodies' forces, force times length; collective."""
-        return self.tangent.round_off * float(self.u.norm())
 
     def extra_work(self, state: Equilibrium) -> float:
         """Work of loads that follow the bodies and of a temperature; collective."""

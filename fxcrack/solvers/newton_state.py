@@ -51,6 +51,7 @@ class Sums(NamedTuple):
         largest_energy: :attr:`StoredEnergy.largest`.
         drift: That of the tangent, see :class:`CondensedTangent`.
         most_energy: :attr:`StoredEnergy.most`.
+        energy_noise: Work of round-off, see :class:`~fxcrack.solvers.newton.NewtonSolver`.
     """
 
     pairing_energy: float
@@ -58,12 +59,14 @@ class Sums(NamedTuple):
     largest_energy: float
     drift: float
     most_energy: float
+    energy_noise: float = 0.0
 
     @classmethod
     def of(cls, values: Array) -> Sums:
-        """From an array of shape (5,), or (4,) of checkpoints before the last one was known."""
-        pairing, force, largest, drift, *most = (float(x) for x in values)
-        return cls(pairing, force, largest, drift, most[0] if most else largest)
+        """From an array of shape (6,), or less of checkpoints before the last ones were known."""
+        pairing, force, largest, drift, *more = (float(x) for x in values)
+        most = more[0] if more else largest
+        return cls(pairing, force, largest, drift, most, more[1] if len(more) > 1 else 0.0)
 
 
 @dataclass(frozen=True)
@@ -76,7 +79,7 @@ class ResumedTangent:
         offset: Forces at no jump and no load, shape (n_last,), force.
         face_loads: Forces of the loads on retained jumps, shape (n_retained, n_forces), force.
         drift: That of the tangent, see :class:`CondensedTangent`.
-        origin: State of the bodies in which it was made, ``None`` where they have no history.
+        origin: State of the bodies in which it was made, ``None`` where it is constant.
         began: End and length of the increment in which it was made, time.
     """
 
@@ -104,7 +107,7 @@ class ResumedTangent:
     def condense(self, tangent: CondensedTangent, coordinates: JumpCoordinates, at: float) -> None:
         """Condense the bodies where the tangent was made; collective.
 
-        Bodies that depend on their history have another one in the accepted state.
+        It serves on while it is not far off, so that it need not be that of the accepted state.
 
         Args:
             tangent: Made again; its bodies are in the accepted state, before and after.
@@ -133,7 +136,7 @@ def body_arrays(bodies: WeakForm, interfaces: DeformedInterfaces, sums: Sums) ->
 
     Returns:
         bodies.* of :meth:`WeakForm.state`, on rank 0; pairing.*[p] where faces slide far; sums,
-        shape (5,).
+        shape (6,).
     """
     out: Arrays = {f"bodies.{name}": values for name, values in bodies.state().items()}
     for p, known in enumerate(interfaces.pairing()):
@@ -171,8 +174,8 @@ def tangent_arrays(tangent: CondensedTangent, system: ContactSystem, face_loads:
 
     Returns:
         dense.*, the dense system: schur, shape (n_last, n_last), offset, shape (n_last,), faces,
-        shape (n_retained, n_forces); where bodies depend on their history tangent.*, the state in
-        which the tangent was made, as :meth:`WeakForm.state` gives it, and began, shape (2,).
+        shape (n_retained, n_forces); where it is not constant tangent.*, the state in which it was
+        made, as :meth:`WeakForm.state` gives it, and began, shape (2,).
     """
     assert system.offset is not None
     out: Arrays = {

@@ -49,12 +49,15 @@ class HighestFrequency:
         comm: Communicator of the bodies.
         mass: Mass of the owned dofs, shape (n_local,).
         start: Start vector, shape (n_local,).
+
+    Attributes:
+        vector: The vector that starts the next call, shape (n_local,).
     """
 
     def __init__(self, comm: MPI.Intracomm, mass: Array, start: Array) -> None:
         self._comm = comm
         self._root = 1.0 / np.sqrt(mass)
-        self._vector = start
+        self.vector = start
 
     def __call__(self, product: Callable[[Array], Array], steps: int = STEPS) -> float:
         """Upper estimate of omega, 1/time; collective.
@@ -65,7 +68,7 @@ class HighestFrequency:
             product: Tangent stiffness times a vector, shape (n_local,) each.
             steps: Lanczos steps.
         """
-        q = self._vector / np.sqrt(self._dot(self._vector, self._vector))
+        q = self.vector / np.sqrt(self._dot(self.vector, self.vector))
         last: Array | float = 0.0
         beta = 0.0
         diagonal, beside, basis = [], [], []
@@ -82,7 +85,7 @@ class HighestFrequency:
             last, q = q, w / beta
         matrix = np.diag(diagonal) + np.diag(beside[:-1], 1) + np.diag(beside[:-1], -1)
         values, vectors = np.linalg.eigh(matrix)
-        self._vector = sum(s * v for s, v in zip(vectors[:, -1], basis, strict=True))
+        self.vector = sum(s * v for s, v in zip(vectors[:, -1], basis, strict=True))
         return float(np.sqrt(max(values[-1], 0.0) + abs(beside[-1] * vectors[-1, -1])))
 
     def _dot(self, x: Array, y: Array) -> float:

@@ -31,7 +31,7 @@ _FEW_COLUMNS = 256
 
 
 class Origin(NamedTuple):
-    """Where the tangent of bodies that depend on their history was made.
+    """Where the tangent was made: not in the accepted state where it still serves there.
 
     Attributes:
         local: From :meth:`WeakForm.snapshot`.
@@ -70,7 +70,7 @@ class CondensedTangent:
         round_off: Residual that rounding alone may leave there, force.
         drift: How far the tangent at hand is off at the accepted state: what was out of balance
             where it was made, over the forces.
-        origin: Where the one at hand was made, ``None`` for bodies that have no history.
+        origin: Where the one at hand was made, ``None`` for bodies whose tangent is constant.
         restraint: What holds the bodies; ``None`` where nothing must.
     """
 
@@ -205,7 +205,7 @@ class CondensedTangent:
             raise
         self._condensation, self._first = free, False
         self._version, self.drift = self.bodies.version, 0.0
-        if self.bodies.path_dependent:
+        if not self.bodies.constant:
             self.origin = Origin(self.bodies.snapshot(), self.bodies.began)
         self._stiff = float(stiffness.norm(PETSc.NormType.NORM_INFINITY))
 

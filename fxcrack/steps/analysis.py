@@ -17,6 +17,7 @@ from mpi4py import MPI
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools
+from fxcrack.base.checks import shown
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
@@ -379,5 +380,12 @@ class HasAnalysis(Protocol):
 
 
 def analysis_of(source: Analysis | HasAnalysis) -> Analysis:
-    """The analysis of a scene, or the analysis itself."""
-    return source if isinstance(source, Analysis) else source.analysis
+    """The analysis of a scene, or the analysis itself.
+
+    Raises:
+        InputError: It is neither.
+    """
+    found = source if isinstance(source, Analysis) else getattr(source, "analysis", None)
+    if not isinstance(found, Analysis):
+        raise InputError(f"source = {shown(source)} must be a scene, or its analysis")
+    return found

@@ -105,7 +105,9 @@ def _errors(rows: Sequence[Row], first: int, round_off: float) -> tuple[float, f
     size = max(size, round_off)
     if not size > 0.0 or first >= len(rows):
         return 0.0, 0.0, 0.0
-    parts = np.array([abs(float(r["balance"])) / size for r in rows[first:]])
+    # what round-off alone may make is no error, however small the energies are
+    off = np.array([max(abs(float(r["balance"])) - round_off, 0.0) for r in rows[first:]])
+    parts = off / size
     parts[np.isnan(parts)] = np.inf
     i = int(np.argmax(parts))
     made = -float(rows[-1].get("numerical_dissipation", 0.0)) / size

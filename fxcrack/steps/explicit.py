@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from fxcrack.base.checks import keep, list_of, not_negative, number, one_of, positive, shown
+from fxcrack.base.checks import keep, list_of, not_negative, number, one_of, positive, shown, whole
 from fxcrack.base.errors import InputError
 from fxcrack.solvers.options import ExplicitOptions
 from fxcrack.steps.end_conditions import Time, Until, conditions
@@ -31,7 +31,8 @@ class Explicit:
             first moment and all bonds tied.
         dt: Increment, time; by default the stable one times ``safety``. The increments are made a
             little shorter where that makes them end at the end time.
-        safety: Part of the stable increment that is used.
+        safety: Part of the stable increment that is used. At finite strain the increment follows it
+            as it changes, unless ``dt`` is given.
         rows: Rows of the history, evenly spaced in time up to the end time.
         contact: How faces of interfaces with ``contact=True`` are kept apart: "exact" by the forces
             for which they just touch, "penalty" by a stiffness.
@@ -77,8 +78,7 @@ class Explicit:
             positive("Explicit", dt=self.dt)
         if not 0.0 < number("Explicit", "safety", self.safety) <= 1.0:
             raise InputError(f"Explicit: safety = {self.safety} must lie between 0 and 1")
-        if not (isinstance(self.rows, int) and self.rows >= 1):
-            raise InputError(f"Explicit: rows = {self.rows!r} must be a whole number, at least 1")
+        keep(self, rows=whole("Explicit", "rows", self.rows))
         one_of("Explicit", "contact", self.contact, CONTACTS)
         one_of("Explicit", "operator", self.operator, OPERATORS)
         positive("Explicit", penalty=self.penalty, tolerance=self.tolerance)

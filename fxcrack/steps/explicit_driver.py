@@ -15,14 +15,21 @@ from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.driver import CheckpointPoint, why_ended
 from fxcrack.steps.explicit import Explicit
+from fxcrack.steps.explicit_increments import Increments
 from fxcrack.steps.explicit_release import ReleaseControl
 from fxcrack.steps.explicit_rows import CrackSpeed, explicit_row, imbalance
 from fxcrack.steps.rows import Observer
 
 FOLLOW = 20
 """Increments between looks at where fronts and faces of bodies that move far are now."""
+LOOK = 10
+"""Increments between looks at how far bodies have strained."""
+STRAINED = 0.01
+"""Change of strain from which on the stable increment may be another one."""
 CHECK = 100
 """Increments between looks at signals and checkpoints."""
+_NONE = 1e-9
+"""Part of a row that is none."""
 _NONLINEAR = 1e3
 """By how much the energies of nonlinear bodies may be off more than those of linear ones."""
 _OVERLAP = 1e-2
@@ -63,7 +70,9 @@ class ExplicitDriver:
             for speed, passed in zip(self.speeds, resume["passed"], strict=True):
                 speed.passed = [(float(t), float(a)) for t, a in passed]
         self._follows = solver.bodies.finite
-        self._may_become_unstable = solver.stability.changes
+        changes = solver.stability.changes
+        self._adapts = changes and solver.bodies.finite and step.dt is None
+        self._may_become_unstable = changes and not self._adapts
         self._good: tuple[Any, list[int], int] | None = None
         self._may_overlap = np.zeros(solver.lumped.n_rows, dtype=bool)
         for pair, rows in zip(solver.pairs, solver.row_of, strict=True):
@@ -80,23 +89,27 @@ class ExplicitDriver:
         length = self.step.end_time - self._start
         if not length > 0.0:
             return f"time {self.step.end_time:g} reached"
-        total = max(int(np.ceil(length / solver.dt - 1e-9)), 1)
-        dt = length / total
-        if solver.dt != dt:
-            solver.dt = dt
-        now = self._loads_at(self._n, dt)
+        self._increments = increments = Increments(
+            self._start, self.step.end_time, solver.dt, solver.stable
+        )
+        if self._resume is not None and "increments" in self._resume:
+            increments.restore(self._resume["increments"])
+        solver.dt = increments.dt
+        now = analysis.loads_at(increments.time(self._n))
         resumed = self._resume is not None
         while True:
             n = self._n
-            analysis.time = self._time(n, dt)
-            then = self._loads_at(n + 1, dt)
+            if self._adapts and not resumed and n % LOOK == 0:
+                self._adapt(n)
+            analysis.time = increments.time(n)
+            then = analysis.loads_at(increments.time(n + 1))
             if self._follows and n % FOLLOW == 0:
                 solver.follow_bodies()
             solver.begin(now, then)
             released = self._release()
             if not resumed:
-                reason = self._ended(released, last=n == total)
-                if reason or self._row_due(n, total):
+                reason = self._ended(released, last=increments.is_end(n))
+                if reason or self._row_due(n):
                     self._evaluate()
                     stopped = self._record("end" if reason else "increment" if n else "start")
                     reason = stopped or reason
@@ -110,11 +123,14 @@ class ExplicitDriver:
             self._n, now = n + 1, then
             analysis.balance.increment += 1
 
-    def _time(self, n: int, dt: float) -> float:
-        return self._start + n * dt
-
-    def _loads_at(self, n: int, dt: float) -> Any:
-        return self.analysis.loads_at(self._time(n, dt))
+    def _adapt(self, n: int) -> None:
+        """Let the increments from number n on follow what is stable now; collective."""
+        solver = self.solver
+        if solver.stability.strained() < STRAINED:
+            return
+        stable = solver.renew_stable_increment()
+        self._increments.adapt(n, stable, self.step.safety)
+        solver.dt = self._increments.dt
 
     def _release(self) -> bool:
         """Release nodes until none is critical; whether any was."""
@@ -147,10 +163,11 @@ class ExplicitDriver:
 
     # -- rows and checks -----------------------------------------------------------------
 
-    def _row_due(self, n: int, total: int) -> bool:
+    def _row_due(self, n: int) -> bool:
         """Whether a row belongs to an increment: the first, and evenly spaced ones."""
-        if n * self.step.rows >= self._rows * total:
-            self._rows = n * self.step.rows // total + 1
+        passed = self._increments.progress(n) * self.step.rows + _NONE
+        if passed >= self._rows:
+            self._rows = int(passed) + 1
             return True
         return False
 
@@ -238,7 +255,13 @@ class ExplicitDriver:
         if self._checkpoint_point is not None:
             passed = [[list(p) for p in speed.passed] for speed in self.speeds]
             self._checkpoint_point(
-                {"start": self._start, "increment": n, "rows": self._rows, "passed": passed}
+                {
+                    "start": self._start,
+                    "increment": n,
+                    "rows": self._rows,
+                    "passed": passed,
+                    "increments": self._increments.state(),
+                }
             )
 
 
