@@ -205,3 +205,19 @@ def test_refusals() -> None:
     smooth = [*finite, fx.Temperature(1.0, amplitude=fx.SmoothStep((0.0, 1.0), (0.0, 1.0)))]
     down = fx.Cycles(maximum=1.0, minimum=0.1, n_max=10.0)
     assert "period=" in refused(smooth, down, materials=expands)
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+def test_a_cycle_without_equilibrium_ends_at_its_maximum(comm: MPI.Intracomm) -> None:
+    """Arms pressed against each other at a node by a sixth of their height: it buckles."""
+    mesh = dcb_2d(comm, length=24.0, height=1.5, dx=1.0, ny=2)
+    scene = specimen(
+        mesh, a0=10.0, contact=True, effects=[fx.FiniteStrain()], criterion=fatigue_law(GIc=4.0)
+    )
+    step = fx.Cycles(maximum=0.5, ratio=-0.5, until=until_length(scene, 12.0))
+    last = scene.run(step, progress=False)[-1]
+    assert last["u[pin_top.y]"] == 0.5
+    assert abs(last["balance"]) < 1e-4 * last["strain_energy"]
+    assert scene.analysis.fatigue.N == 0.0
+    scene.close()

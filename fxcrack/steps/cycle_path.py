@@ -18,9 +18,11 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array
+from fxcrack.base.errors import NO_EQUILIBRIUM
 from fxcrack.criteria import CycleRates, Regime, total
 from fxcrack.criteria.evaluator import repeat_tips
 from fxcrack.criteria.rate_evaluator import RateEvaluator
+from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.tips import Tips
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycle_equilibria import Corner, CycleEquilibria, Instant
@@ -56,6 +58,16 @@ class StabilisedCycle:
         Args:
             corners: Corners of the cycle, the first at its maximum.
         """
+        try:
+            way = self._way(corners)
+        except (NotPositiveDefinite, *NO_EQUILIBRIUM):
+            self._equilibria.end()  # the step ends at the maximum of the cycle
+            raise
+        self._equilibria.end()
+        return self._extremes(way)
+
+    def _way(self, corners: Sequence[Corner]) -> list[Instant]:
+        """Instants of the stabilised cycle between which G is a parabola."""
         equilibria, ends = self._equilibria, list(corners[1:])
         if len(ends) > 1 or equilibria.settles:
             ends.append(corners[0])
@@ -73,8 +85,7 @@ class StabilisedCycle:
         way = instants[:1]
         for a, b in pairwise(instants):
             way += self._between(a, b, largest, _HALVINGS)
-        equilibria.end()
-        return self._extremes(way)
+        return way
 
     def _once(self, start: Instant, ends: list[Corner]) -> tuple[list[Instant], Array]:
         """Instants of one cycle and the largest rate at each tip."""
