@@ -105,7 +105,8 @@ def test_an_equilibrium_that_is_not_that_of_the_work_is_refused(
 def test_contact_does_not_add_increments_before_an_onset(comm: MPI.Intracomm) -> None:
     """Faces that never touch: as many rows with contact as without, and the same loads.
 
-    Open faces are paired anew as they turn, which moves the front's neighbours a little.
+    Open faces are paired anew once a node has slid by 1e-3 of a facet, which moves the points below
+    the front's neighbours, and with them openings, by that much of the turn: 8e-6 of the load here.
     """
     rows = {}
     for contact in (False, True):
@@ -114,4 +115,4 @@ def test_contact_does_not_add_increments_before_an_onset(comm: MPI.Intracomm) ->
         )
         rows[contact] = list(history["event"]), column(history, "time")
     assert rows[True][0] == rows[False][0]
-    assert rows[True][1] == pytest.approx(rows[False][1], rel=1e-6)
+    assert rows[True][1] == pytest.approx(rows[False][1], rel=5e-5)
