@@ -155,9 +155,10 @@ def test_faces_that_slide_keep_the_energy_balance() -> None:
         work = np.abs(history["external_work"]).max()
         # asked for; measured 1.4e-7, the trapezoidal rule's error on the way to a new pairing
         assert np.abs(history["balance"]).max() < 1e-4 * work
-    taken = [h.rows[-1]["pairing_energy"] for h in histories]
-    # a contact force stays where it is for an increment: an error of first order, here 0.55
-    assert 0.0 < taken[1] < 0.65 * taken[0]
+        # a contact force stays where it is for an increment; of either sign, as the way between two
+        # pairings is longer or shorter than a thousandth of a facet; measured 0.015 and 0.019
+        taken = np.abs(history["pairing_energy"].astype(float)).max()
+        assert 0.0 < taken < 0.04 * work
 
 
 @pytest.mark.slow
