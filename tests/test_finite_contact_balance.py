@@ -115,4 +115,4 @@ def test_contact_does_not_add_increments_before_an_onset(comm: MPI.Intracomm) ->
         )
         rows[contact] = list(history["event"]), column(history, "time")
     assert rows[True][0] == rows[False][0]
-    assert rows[True][1] == pytest.approx(rows[False][1], rel=5e-5)
+    assert rows[True][1] == pytest.approx(rows[False][1], rel=2e-5)

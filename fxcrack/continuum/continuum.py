@@ -20,6 +20,7 @@ import numpy as np
 import numpy.typing as npt
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base import collective_garbage
@@ -381,6 +382,16 @@ class Continuum:
 
         interpolate_given(self.comm, function, title, "value", value)
         return function
+
+    def parts_at(self, nodes: npt.NDArray[np.integer]) -> npt.NDArray[np.bool_]:
+        """Which parts have cells at global nodes, shape (n, n_parts); collective."""
+        dofmap = self.space.dofmap
+        out = np.zeros((len(nodes), len(self.part_cells)), dtype=bool)
+        for i, cells in enumerate(self.part_cells):
+            local = np.unique(np.asarray(dofmap.list)[cells]).astype(np.int32)
+            out[:, i] = np.isin(nodes, np.asarray(dofmap.index_map.local_to_global(local)))
+        self.comm.Allreduce(MPI.IN_PLACE, out, op=MPI.LOR)
+        return out
 
     def owned_nodes(self, where: str) -> Ints:
         """Displacement nodes of a group that this rank owns; collective.

@@ -29,14 +29,12 @@ which for small eps is the angle of K at the length d exp(digamma(1/2) - digamma
 from __future__ import annotations
 
 import numpy as np
-from mpi4py import MPI
 from scipy.special import loggamma
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
-from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.criteria.cell_laws import law_of
@@ -86,8 +84,8 @@ class ModesAtLength:
                 "crack-tip fields of the two materials must be known; leave it out"
             )
         self._stiffness = [law_of(continuum, i).whole for i in range(len(continuum.part_materials))]
-        self._above = _parts_at(continuum, probe.pair.surface.dofs)
-        below = _parts_at(continuum, probe.pair.masters.ravel())
+        self._above = continuum.parts_at(probe.pair.surface.dofs)
+        below = continuum.parts_at(probe.pair.masters.ravel())
         held = np.abs(probe.pair.weights)[..., None] > 1e-9
         self._below = (below.reshape(*held.shape[:2], -1) & held).any(axis=1)
         self._said = False
@@ -189,14 +187,3 @@ def closure_lengths(tips: Tips, order: int, method: str) -> Array:
         return np.where(on, tips.d_ahead, tips.d_behind)
     ahead = np.where(on & tips.straight, tips.d_ahead, tips.d_behind)
     return length_of_force(ahead, tips.d_behind, min(order, 2))
-
-
-def _parts_at(continuum: Continuum, nodes: Ints) -> Bools:
-    """Which parts of the continuum have cells at global nodes, shape (n, n_parts); collective."""
-    dofmap = continuum.space.dofmap
-    out = np.zeros((len(nodes), len(continuum.part_cells)), dtype=bool)
-    for i, cells in enumerate(continuum.part_cells):
-        local = np.unique(np.asarray(dofmap.list)[cells]).astype(np.int32)
-        out[:, i] = np.isin(nodes, np.asarray(dofmap.index_map.local_to_global(local)))
-    continuum.comm.Allreduce(MPI.IN_PLACE, out, op=MPI.LOR)
-    return out

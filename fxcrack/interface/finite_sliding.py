@@ -21,7 +21,7 @@ import scipy.sparse as sp
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.frames import local_frames
 from fxcrack.interface.mortar import surface_weights
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import NEAR, Pair
 from fxcrack.interface.projection import project
 from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.rigid_pairing import renewed_on
@@ -30,8 +30,6 @@ from fxcrack.interface.surface import FacetSurface
 _SLIDE = 1e-3
 """Part of a facet a node may slide, and angle its normal may turn, before it is paired anew. Ten
 times as much changes forces by 0.3 % (a clamped beam that turns) to 0.5 % (friction in bending)."""
-_NEAR = 0.5
-"""Parts of a facet within which a gap may close in the next increment."""
 _OF_MASTERS = ("masters", "weights")
 _CHANGING = ("paired", "frames", "gap")
 
@@ -77,11 +75,11 @@ def renewed(
     over = ~bonded & (aside <= 0.1 * size + 0.1 * np.abs(gap))
     nodes, new = now.facets[foot.facet], foot.weights
     if pair.surface_to_surface:
-        means = surface_weights(pair.whole_surface.moved(x), now, foot, _NEAR * size)
+        means = surface_weights(pair.whole_surface.moved(x), now, foot, NEAR * size)
         nodes, new = means.masters, means.weights
     # by nodes: above a node the facet is one or the other by round-off, its weights are the same
     slid = _change(pair, now.dofs[nodes], new) > _SLIDE
-    near = over & (gap < _NEAR * size)
+    near = over & (gap < NEAR * size)
     turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
     slid |= turn > _SLIDE
     if not np.any(near & (slid | ~pair.paired)) and not np.any(over & (turn > turned)):

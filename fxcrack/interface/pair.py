@@ -16,6 +16,11 @@ from fxcrack.interface.hierarchy import Hierarchy, linked
 from fxcrack.interface.rigid import RIGID, RigidSurface
 from fxcrack.interface.surface import FacetSurface
 
+FACING = -0.5
+"""Cosine between the outward normals of two surfaces that face each other, at most."""
+NEAR = 0.5
+"""Parts of a facet within which a gap may close in the next increment."""
+
 
 @dataclass(frozen=True)
 class Pair:

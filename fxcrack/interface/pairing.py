@@ -25,7 +25,7 @@ from fxcrack.interface.definition import Interface, check_coefficients
 from fxcrack.interface.frames import local_frames
 from fxcrack.interface.hierarchy import corner_surface, is_hierarchical
 from fxcrack.interface.mortar import surface_weights
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import FACING, Pair
 from fxcrack.interface.projection import project
 from fxcrack.interface.rigid import RIGID, RigidSurface
 from fxcrack.interface.rigid_pairing import check_symmetry, find_partners
@@ -39,9 +39,6 @@ from fxcrack.interface.roles import (
     stiffness_ratio,
 )
 from fxcrack.interface.surface import FacetSurface, gather_surface
-
-_FACING = -0.5
-"""Cosine between the outward normals of two surfaces that face each other, at most."""
 
 _BORDER = 1e-6
 """Distance to the border of the bonded region, in facet lengths, up to which a node is on it."""
@@ -135,7 +132,7 @@ def grown_together(slave: FacetSurface, master: FacetSurface, where: str) -> Boo
         InterfaceError: The surfaces share nodes but do not face each other there.
     """
     _, mine, others = np.intersect1d(slave.dofs, master.dofs, return_indices=True)
-    facing = np.einsum("nc,nc->n", slave.normals[mine], master.normals[others]) < _FACING
+    facing = np.einsum("nc,nc->n", slave.normals[mine], master.normals[others]) < FACING
     if not np.all(facing) or len(mine) == slave.n_nodes:
         raise InterfaceError(
             f"{where}: surfaces '{slave.name}' and '{master.name}' share {len(mine)} nodes; the "

@@ -21,16 +21,12 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.interface.frames import local_frames
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import FACING, NEAR, Pair
 from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.surface import FacetSurface, facet_element
 
-_FACING = -0.5
-"""Cosine between the outward normal of a slave node and the normal of the surface, at most."""
 _TURNED = 0.01
 """Angle by which the normal below a node turns before it is paired anew."""
-_NEAR = 0.5
-"""Parts of a facet within which a gap may close in the next increment."""
 
 
 def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
@@ -109,7 +105,7 @@ def find_partners(
     near = np.abs(gap) <= tolerance
     facing = _facing(slave, normals)
     there = bonded & near if np.any(bonded & near) else near
-    behind = there & (facing > -_FACING)
+    behind = there & (facing > -FACING)
     if np.any(behind) and 2 * int(behind.sum()) >= int(there.sum()):
         side = "reverse its normal" if surface.flat else "exchange inside=True and False"
         i = int(np.argmax(behind))
@@ -120,7 +116,7 @@ def find_partners(
             f"{format_point(normals[i])}, must be opposite; {side}, or name the surface of the "
             "body that faces it"
         )
-    paired = near & (facing < _FACING)
+    paired = near & (facing < FACING)
     lost = bonded & ~paired
     if np.any(lost):
         far = np.where(lost, np.abs(gap), -1.0)
@@ -136,7 +132,7 @@ def find_partners(
             "move the surface to them, take them out of the bonded set, or raise "
             "Interface(tolerance=...)"
         )
-    through = ~paired & (gap < -tolerance) & (facing < _FACING)
+    through = ~paired & (gap < -tolerance) & (facing < FACING)
     if np.any(through):
         i = int(np.argmin(np.where(through, gap, np.inf)))
         raise InterfaceError(
@@ -164,9 +160,9 @@ def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
     x = pair.surface.x.copy()
     x[:, :gdim] += u_slave
     distance, normals = surface.measure(x)
-    facing = _facing(pair.whole_surface.moved(x), normals) < _FACING
+    facing = _facing(pair.whole_surface.moved(x), normals) < FACING
     over = ~bonded & (pair.paired | facing)
-    near = over & (distance < _NEAR * pair.surface.facet_size)
+    near = over & (distance < NEAR * pair.surface.facet_size)
     turned = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _TURNED
     if not np.any(near & (turned | ~pair.paired)):
         return None
