@@ -13,8 +13,8 @@ contract as they turn do so in u2: nothing is left for cantilever arms and rigid
 left is stretching between supports, stiffening by tension and softening by compression.
 
 Compression of what has hardly deflected yet shows in no energy of u. Its part of the buckling load
-is the largest mu in K_g x = -mu K x. A few vectors x, K x_0 a load that varies in space, K x_k+1 =
--K_g x_k, span a space whose largest mu is a lower bound, close to it where one mode leads.
+is the largest mu in K_g x = -mu K x. Two vectors, K x_0 a load that varies in space and K x_1 =
+-K_g x_0, span a space whose largest mu is a lower bound, close to it where one mode leads.
 
 Both take back-substitutions and no factorisation.
 """
@@ -37,7 +37,7 @@ LARGE = 0.1
 
 A circular plate with a clamped edge is there at a deflection of 0.46 of its thickness.
 """
-_VECTORS = 3
+_VECTORS = 2
 """Vectors of the space in which the buckling load is sought."""
 _DEPENDENT = 1e-10
 """Part of a vector that is new in the space, squared, below which it is dropped."""
