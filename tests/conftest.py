@@ -173,34 +173,34 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """With FXCRACK_TEST_SPREAD, leave some tests to the run on another number of ranks.
 
     "quick": every other test runs on 2 ranks and the rest on 3. "slow": these tests run on the
-    number of ranks they did not have; every other test runs on both, each of its parameters on one
-    of them: one in three on 3 ranks, which share the two cores of a small machine. What bears the
+    number of ranks they did not have. Of the others, those without parameters all run on 2 ranks
+    and every other one of a file on 3, which share the two cores of a small machine; those with
+    parameters run on both, two thirds of the parameters on 2 ranks and one on 3. What bears the
     mark "each" is not spread.
     """
     spread = os.environ.get("FXCRACK_TEST_SPREAD")
     if spread is None or WORLD.size not in (2, 3):
         return
-    spreadable = [item for item in items if not item.get_closest_marker("each")]
-    left = [
-        item
-        for item in spreadable
-        if _is_quick_on_ranks(item)
-        and (_ranks_when_quick(item) == WORLD.size) != (spread == "quick")
-    ]
-    if spread == "slow":
-        left += [item for item in items if item not in spreadable and _is_quick_on_ranks(item)]
-        tests: dict[str, list[pytest.Item]] = {}
-        for item in items:
-            if not _is_quick_on_ranks(item):
-                tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
-        left += [
-            item
-            for same in tests.values()
-            for i, item in enumerate(same)
-            if len(same) > 1
-            and (i % (3 if len(same) > 2 else 2) == 0) != (WORLD.size == 3)
-            and item in spreadable
-        ]
+    left = []
+    functions: dict[str, dict[str, list[pytest.Item]]] = {}
+    for item in items:
+        each = item.get_closest_marker("each") is not None
+        if _is_quick_on_ranks(item):
+            here = each or _ranks_when_quick(item) == WORLD.size
+            if here != (spread == "quick"):
+                left.append(item)
+        elif not each:
+            file, _, name = item.nodeid.partition("::")
+            functions.setdefault(file, {}).setdefault(name.partition("[")[0], []).append(item)
+    for of_file in functions.values():
+        singles = 0
+        for same in of_file.values():
+            if len(same) == 1:
+                singles += 1
+                left += same if WORLD.size == 3 and singles % 2 == 0 else []
+                continue
+            every = 3 if len(same) > 2 else 2
+            left += [item for i, item in enumerate(same) if (i % every == 0) != (WORLD.size == 3)]
     config.hook.pytest_deselected(items=left)
     items[:] = [item for item in items if item not in left]
 
