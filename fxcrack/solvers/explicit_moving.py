@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.base.arrays import Bools
+from fxcrack.base.arrays import Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
 from fxcrack.interface.finite_sliding import changing, renewed, with_changing
 from fxcrack.interface.front import Front
+from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.pairing import local_frames
+from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.surface import FacetSurface, gather_surface
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 
@@ -24,7 +26,7 @@ _TURNED = 0.2
 
 def sliding_masters(
     continuum: Continuum, pairs: Sequence[Pair], *, finite: bool
-) -> list[FacetSurface | None]:
+) -> list[FacetSurface | RigidSurface | None]:
     """Undeformed master surfaces of the pairs whose open nodes are paired anew; collective.
 
     Args:
@@ -35,15 +37,23 @@ def sliding_masters(
     Returns:
         ``None`` for pairs that stay as they are.
     """
-    out: list[FacetSurface | None] = []
+    out: list[FacetSurface | RigidSurface | None] = []
     for pair in pairs:
         master = pair.sides[1]
-        # a rigid surface has no nodes
-        if finite and pair.interface.contact and isinstance(master, str | Face):
+        if not finite or not pair.interface.contact:
+            out.append(None)
+        elif isinstance(master, str | Face):
             out.append(gather_surface(continuum, master))
         else:
-            out.append(None)
+            out.append(pair.rigid)
     return out
+
+
+def _nodes_of(lumped: LumpedInterface, master: FacetSurface | RigidSurface) -> Ints:
+    """Interface nodes of a master surface, shape (n,); a rigid one has none."""
+    if isinstance(master, FacetSurface):
+        return lumped.nodes.find(master.dofs)
+    return np.zeros(0, dtype=np.int64)
 
 
 class MovingInterfaces:
@@ -58,7 +68,7 @@ class MovingInterfaces:
 
     def __init__(
         self, dynamics: InterfaceDynamics, pairs: list[Pair], fronts: Sequence[Front],
-        masters: Sequence[FacetSurface | None],
+        masters: Sequence[FacetSurface | RigidSurface | None],
     ) -> None:  # fmt: skip
         self._dynamics, self._pairs, self._fronts = dynamics, pairs, fronts
         self._masters, lumped = masters, dynamics.lumped
@@ -66,7 +76,7 @@ class MovingInterfaces:
         self._nodes = [
             None
             if master is None
-            else (lumped.nodes.find(pair.surface.dofs), lumped.nodes.find(master.dofs))
+            else (lumped.nodes.find(pair.surface.dofs), _nodes_of(lumped, master))
             for pair, master in zip(pairs, masters, strict=True)
         ]
 
@@ -85,6 +95,7 @@ class MovingInterfaces:
                 # open pairs keep the normal that their gap was found with
                 turn = has & (self._held(p) | ~self._pairs[p].paired)
                 changed |= self._pair_anew(p)
+            turn &= ~lumped.rigid[rows]  # their normals are those of the rigid surface
             lumped.frames[rows[turn]] = frames[turn]
         if changed:
             lumped.set_pairing(self._pairs)

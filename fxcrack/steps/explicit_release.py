@@ -83,7 +83,10 @@ class ReleaseControl:
             if len(tips):
                 crack.check_wake(tips)
             row_of = self._solver.row_of[crack.p]
-            behind = lumped.mean_jumps(row_of[tips.wake_nodes[:, 0]], tips.wake_weights[:, 0])
+            # on a plane of symmetry rates are those of the whole crack
+            factor = crack.probe.pair.interface.opening_factor
+            rows_behind = row_of[tips.wake_nodes[:, 0]]
+            behind = lumped.mean_jumps(rows_behind, factor * tips.wake_weights[:, 0])
             self._screen = _Screen(
                 tips, self._solver.dynamics.chosen_bonds(row_of[tips.node]),
                 behind, self._bounds(tips), version,
