@@ -128,20 +128,23 @@ def test_bonds_on_a_wall_are_a_support(comm: MPI.Intracomm) -> None:
 
 
 @pytest.mark.mpi
+@pytest.mark.slow
 def test_a_block_runs_around_in_a_bore(comm: MPI.Intracomm) -> None:
     """Finite strain: normals and gaps are those below the nodes where they are now."""
     radius = 3.0
     bore = fx.RigidCylinder((0.25, 2.98), (0.0, 0.0, 1.0), radius, inside=True)
-    rows = history(block_in(comm, bore), 2.2e-4)
+    rows = history(block_in(comm, bore), 1.6e-4)
     corners = rows["m[left x]"], rows["m[left y]"], rows["m[right x]"] + 0.5, rows["m[right y]"]
     left, right = (
         np.hypot(corners[k].astype(float) - 0.25, corners[k + 1].astype(float) - 2.98)
         for k in (0, 2)
     )
     turned = np.arctan2(corners[0].astype(float) - 0.25, 2.98 - corners[1].astype(float))
-    assert turned.max() > 0.8
-    # a node moves along the tangent between two pairings, each a hundredth of a radian at most
-    assert max(left.max(), right.max()) <= radius * (1.0 + 1e-3)
+    assert turned.max() > 0.6
+    # a node moves along the tangent for one increment, which leaves s^2/(2 R): 1e-7 of R
+    assert max(left.max(), right.max()) <= radius * (1.0 + 1e-5)
+    # a perfectly plastic impact with every turn of the normal loses little
+    assert rows["kinetic_energy"][-1] > 0.95 * rows["initial_energy"][0]
     assert np.abs(rows["balance"]).max() <= 1e-3 * rows["initial_energy"][0]
 
 
@@ -153,7 +156,7 @@ def block_in(comm: MPI.Intracomm, bore: Any) -> fx.Scene:
     )  # fmt: skip
 
     def make() -> Blocks:
-        model, axis = Blocks(), np.linspace(0.0, 0.5, 3)
+        model, axis = Blocks(), np.linspace(0.0, 0.5, 2)
         block = model.add("body", (axis, axis), "quadrilateral", 1)
         model.group("upper_face", block.part(y=0.0))
         model.group("tip_left", block.part(x=0.0, y=0.0))

@@ -19,6 +19,7 @@ from fxcrack.criteria.crack_closure import closure_weights
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues
 from fxcrack.criteria.mixed_mode import least_critical
+from fxcrack.interface.lumped_rows import mean_jumps
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.explicit_bonds import Fading
@@ -85,8 +86,8 @@ class ReleaseControl:
             row_of = self._solver.row_of[crack.p]
             # on a plane of symmetry rates are those of the whole crack
             factor = crack.probe.pair.interface.opening_factor
-            rows_behind = row_of[tips.wake_nodes[:, 0]]
-            behind = lumped.mean_jumps(rows_behind, factor * tips.wake_weights[:, 0])
+            rows = row_of[tips.wake_nodes[:, 0]]
+            behind = mean_jumps(lumped, rows, factor * tips.wake_weights[:, 0])
             self._screen = _Screen(
                 tips, self._solver.dynamics.chosen_bonds(row_of[tips.node]),
                 behind, self._bounds(tips), version,
