@@ -353,7 +353,8 @@ def _solid(continuum: Continuum, i: int) -> _Solid:
             held = (whole @ expansion)[keep]
     cell = getattr(basix.CellType, continuum.mesh.domain.topology.cell_name())
     points = basix.make_quadrature(cell, continuum.degree)
-    return _Solid(continuum, continuum.part_cells[i], points, lambda at: moduli, held)
+    cells = continuum.part_cells[i].astype(np.int64)
+    return _Solid(continuum, cells, points, lambda at: moduli, held)
 
 
 def _shell_solids(continuum: Continuum, i: int) -> list[_Kind]:
