@@ -15,8 +15,9 @@ on the masters accelerates the jump by H p, with a compliance H per component of
     H = sum_j B_j^2/m_j,    B = (E_s - W) T
 
 where T takes the motion of the nodes that follow nothing to that of all nodes and prescribed
-components count as infinite mass. Where every slave has one master of its own, all of this is
-indexing; otherwise sparse products. Products for chosen rows are in
+components count as infinite mass. Rows on a rigid surface have no masters: bonded ones rest, or
+slip along it (:mod:`fxcrack.interface.slipping_ties`). Where every slave has one master of its own,
+all of this is indexing; otherwise sparse products. Products for chosen rows are in
 :mod:`fxcrack.interface.lumped_rows`, couplings and equations, which T knows as well, in
 :mod:`fxcrack.interface.lumped_constraints`.
 """
@@ -38,6 +39,8 @@ from fxcrack.interface.constrained_slaves import drop_constrained
 from fxcrack.interface.lumped_constraints import LumpedConstraints, SetAccelerations
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
+from fxcrack.interface.rigid import RigidSurface
+from fxcrack.interface.slipping_ties import SlippingTies, refuse_masters_that_slip, slipping
 from fxcrack.interface.supported_slaves import align_frames, check_slaves
 from fxcrack.interface.supports import Supports
 from fxcrack.interface.surface import FacetSurface
@@ -68,8 +71,8 @@ class LumpedInterface:
         pairs: Interfaces.
         supports: Prescribed components.
         mass: Mass of the owned dofs, shape (n_local,).
-        masters: Master surfaces per pair that open nodes may be paired with anew; ``None`` where
-            they stay as they are, as all do by default.
+        masters: Master surfaces per pair that open nodes may be paired with anew, rigid ones among
+            them; ``None`` where they stay as they are, as all do by default.
 
     Raises:
         InterfaceError: A support holds a bonded slave but not its masters alike, a node is a slave
@@ -86,7 +89,9 @@ class LumpedInterface:
         jumped: Per pair, the slave nodes that have a jump, shape (n_slaves,).
         slave: Interface node of each row's slave, shape (n_rows,).
         paired: Whether each row has a master at present, shape (n_rows,).
+        rigid: Whether that is a rigid surface, shape (n_rows,).
         simple: Whether every slave has one master of its own.
+        separate: Whether forces on open rows move no jump but their own.
         frames: Frame of each row, columns normal and tangents, shape (n_rows, gdim, gdim).
         held: Components of these frames that supports hold, shape (n_rows, gdim).
         gap: Initial normal gap of each row, shape (n_rows,), length.
@@ -110,7 +115,7 @@ class LumpedInterface:
 
     def __init__(
         self, layout: DofLayout, pairs: Sequence[Pair], supports: Supports, mass: Array,
-        masters: Sequence[FacetSurface | None] = (),
+        masters: Sequence[FacetSurface | RigidSurface | None] = (),
     ) -> None:  # fmt: skip
         gdim = layout.gdim
         self.jumped = [p.paired.copy() for p in pairs]
@@ -123,8 +128,9 @@ class LumpedInterface:
         if following is not None:
             further += [d // layout.n_unknowns for d in (following.dofs, following.masters)]
         self.nodes = nodes = InterfaceNodes.of_pairs(
-            layout, pairs, [m for m in masters if m is not None], self.jumped, _joined(further)
-        )
+            layout, pairs, [m for m in masters if isinstance(m, FacetSurface)], self.jumped,
+            _joined(further),
+        )  # fmt: skip
         self.constraints = None if following is None else LumpedConstraints(following, nodes)
         self.n_motions = 0 if self.constraints is None else self.constraints.n_motions
         which, value = supports.at_nodes(nodes)
@@ -160,6 +166,7 @@ class LumpedInterface:
             [np.zeros(0), *(p.gap[j] for p, j in zip(pairs, self.jumped, strict=True))]
         )
         self.version = 0
+        self.rigid, self._slips = slipping(pairs, self.row_of, self.n_rows)
         self.set_pairing(pairs)
 
     def _support_of(self, pair: Pair) -> Ints:
@@ -207,6 +214,7 @@ class LumpedInterface:
         rows = np.repeat(np.arange(self.n_rows), np.diff(self.weights.indptr))
         below = row_at[self.weights.indices]
         rows, below = rows[below >= 0], below[below >= 0]
+        refuse_masters_that_slip(self._slips, below)
         depth = np.zeros(self.n_rows, dtype=np.int64)
         for _ in range(self.n_rows + 1):
             deeper = depth.copy()
@@ -225,15 +233,18 @@ class LumpedInterface:
         """Tie some rows, shape (n_rows,), and leave the others open."""
         self.tied, self.open = tied.copy(), np.flatnonzero(~tied)
         self._ties = [
-            self._tie(np.flatnonzero(tied & (self.depth == d)))
+            self._tie(np.flatnonzero(tied & ~self._slips & (self.depth == d)))
             for d in range(int(self.depth.max(initial=0)), -1, -1)
         ]
         self._ties = [t for t in self._ties if len(t.rows)]
+        rows = np.flatnonzero(tied & self._slips)
+        self._slipping = SlippingTies(rows, self.slave[rows], self.frames[rows][:, :, 0])
         self.group_mass = self.collect(self.mass[:, None].copy())[:, 0]
         self.inverse = np.where(self.which < 0, 1.0 / self.group_mass[:, None], 0.0)
         self.version += 1
         self._following: sp.csr_matrix | None = None
         self._open_slaves = self.slave[self.open]
+        self.separate = True
         if self.simple:
             assert self.master is not None
             self._open_masters = self.master[self.open]
@@ -251,6 +262,11 @@ class LumpedInterface:
         self._root = sp.csr_matrix(self._jump @ self._motion())
         self._root_t = self._root.T.tocsr()
         self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
+        self._root.eliminate_zeros()
+        if np.bincount(self._root.indices).max(initial=0) <= 1:
+            self.reach = self.compliance
+            return
+        self.separate = False
         size = abs(self._root)
         loose = self.inverse.max(axis=1, initial=0.0)  # forces of any direction, unlike supports
         sums = size @ (loose * (size.T @ np.ones(len(self.open))))
@@ -265,7 +281,12 @@ class LumpedInterface:
         motion = sp.csr_matrix(self.following @ constraints.motion)
         self.accelerations = sets = SetAccelerations(motion, inverse)
         jumps = by_component(self._jump, gdim)
-        self.compliance = sets.diagonal_of(jumps).reshape(-1, gdim)
+        self.compliance = self.reach = sets.diagonal_of(jumps).reshape(-1, gdim)
+        root = sp.csr_matrix(jumps @ motion)
+        root.eliminate_zeros()
+        if np.bincount(root.indices).max(initial=0) <= 1 and not sets.moves_sets(jumps):
+            return
+        self.separate = False
         reach = sets.bound_of(jumps).reshape(-1, gdim).max(axis=1, initial=0.0)
         self.reach = np.repeat(reach[:, None], gdim, axis=1)
 
@@ -318,7 +339,10 @@ class LumpedInterface:
     def following(self) -> sp.csr_matrix:
         """Motion of the nodes by that of those that follow nothing, on components, square."""
         if self._following is None:
-            self._following = by_component(self._motion(), self.which.shape[1])
+            following = by_component(self._motion(), self.which.shape[1])
+            if len(self._slipping):
+                following = self._slipping.projection(len(self.nodes)) @ following
+            self._following = sp.csr_matrix(following)
         return self._following
 
     def _tie(self, rows: Ints) -> _Tie:
@@ -337,7 +361,7 @@ class LumpedInterface:
             leads[self.slave[self.tied]] = self.master[self.tied]
             return sp.csr_matrix((np.ones(n), leads, np.arange(n + 1)), shape=(n, n))
         keep = np.ones(n)
-        keep[self.slave[self.tied]] = 0.0
+        keep[self.slave[self.tied & ~self._slips]] = 0.0
         out = sp.csr_matrix(sp.diags(keep))
         for tie in reversed(self._ties):
             m = len(tie.rows)
@@ -375,6 +399,8 @@ class LumpedInterface:
                 values[tie.slaves] = values[tie.masters]
             elif tie.weights is not None:
                 values[tie.slaves] = tie.weights[0] @ values
+        if len(self._slipping):
+            self._slipping.follow(values)
         return values
 
     def bond_forces(self, acceleration: Array, total: Array) -> tuple[Ints, Array]:
@@ -392,6 +418,11 @@ class LumpedInterface:
             s = tie.slaves
             rows.append(tie.rows)
             forces.append(self.group_mass[s, None] * acceleration[s] - total[s])
+        if len(self._slipping):
+            s = self._slipping.slaves
+            held = self.group_mass[s, None] * acceleration[s] - total[s]
+            rows.append(self._slipping.rows)
+            forces.append(self._slipping.along_normals(held))
         if len(rows) == 1:
             return rows[0], forces[0]
         return _joined(rows), _stacked_vectors(forces, acceleration.shape[1])
@@ -405,7 +436,7 @@ class LumpedInterface:
         if self.simple:
             return 0.0
         square = (velocity**2).sum(axis=1)
-        slaves = self.slave[self.tied]
+        slaves = self.slave[self.tied & ~self._slips]
         root = np.ones(len(self.nodes), dtype=bool)
         root[slaves] = False
         more = float((self.group_mass - self.mass)[root] @ square[root])

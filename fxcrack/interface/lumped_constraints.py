@@ -88,6 +88,12 @@ class SetAccelerations:
         by_sets = rows @ self._by_sets
         return sp.csr_matrix(rows @ self._direct + by_sets @ self._small @ self._by_sets.T)
 
+    def moves_sets(self, rows: sp.csr_matrix) -> bool:
+        """Whether forces on rows of shape (m, n) accelerate any set as a whole."""
+        by_sets = sp.csr_matrix(rows @ self._by_sets)
+        by_sets.eliminate_zeros()
+        return bool(by_sets.nnz)
+
     def diagonal_of(self, rows: sp.csr_matrix) -> Array:
         """Diagonal of R A R^t with rows R of shape (m, n), shape (m,)."""
         by_sets = sp.csr_matrix(rows @ self._by_sets)

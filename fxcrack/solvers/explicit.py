@@ -230,6 +230,11 @@ class ExplicitSolver:
         """Take front geometry, contact normals and pairs of bodies that move far; collective."""
         self._moving.follow()
 
+    def follow_curved(self) -> None:
+        """Take normals and gaps of curved rigid surfaces, in every increment; collective."""
+        if self._moving.curved:
+            self._moving.follow_curved()
+
     def renew_stable_increment(self) -> float:
         """The stable increment with the present tangent, by a few more steps; collective."""
         self.stable = self.stability.again(self.velocity)

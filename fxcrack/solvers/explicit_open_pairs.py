@@ -97,7 +97,7 @@ class OpenPairs:
         self._gaps = np.zeros(len(self._may_touch))
         self._faces = OpenFaces(
             self._normal, lumped.gap[rows] if self._has_gap else None, self._may_touch,
-            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.simple,
+            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.separate,
         )  # fmt: skip
         self._last_found: FaceForces | None = None
 

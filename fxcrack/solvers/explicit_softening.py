@@ -45,7 +45,7 @@ class LiveBonds:
         self.direction = bonds.direction[k]
         self.along = jumps_along(lumped, k, self.direction)
         self.push, self.coupling = pull_along(lumped, k, self.direction)
-        self.coupled = not lumped.simple
+        self.coupled = not lumped.separate
         self._strength, self._final = bonds.strength[k], bonds.final[k]
         self.origin = bonds.origin[k]
         self._numbers = list(zip(self._strength.tolist(), self._final.tolist(), strict=True))

@@ -82,13 +82,14 @@ class PrescribedMotion:
         node = self._nodes[0]
         if self._gives is not None:
             wanted = lumped.group_mass[:, None] * dynamics.a - dynamics.total
-            wanted[lumped.slave[lumped.tied]] = 0.0
+            wanted[lumped.slave[lumped.tied & ~lumped.rigid]] = 0.0
             return self._gives(wanted.ravel())
         if not len(node):
             return np.zeros(0)
         needed = lumped.group_mass[node] * dynamics.a[self._nodes]
         follows = np.zeros(len(lumped.nodes), dtype=bool)
-        follows[lumped.slave[lumped.tied]] = True
+        # on a rigid surface no master shows the reaction instead
+        follows[lumped.slave[lumped.tied & ~lumped.rigid]] = True
         return np.where(follows[node], 0.0, needed - dynamics.total[self._nodes])
 
     def by_column(self, reactions: Array, n_columns: int) -> Array:

@@ -84,7 +84,10 @@ class ReleaseControl:
             if len(tips):
                 crack.check_wake(tips)
             row_of = self._solver.row_of[crack.p]
-            behind = mean_jumps(lumped, row_of[tips.wake_nodes[:, 0]], tips.wake_weights[:, 0])
+            # on a plane of symmetry rates are those of the whole crack
+            factor = crack.probe.pair.interface.opening_factor
+            rows = row_of[tips.wake_nodes[:, 0]]
+            behind = mean_jumps(lumped, rows, factor * tips.wake_weights[:, 0])
             self._screen = _Screen(
                 tips, self._solver.dynamics.chosen_bonds(row_of[tips.node]),
                 behind, self._bounds(tips), version,
