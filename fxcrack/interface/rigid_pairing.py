@@ -141,8 +141,9 @@ def find_partners(
 
 
 def renewed_on(
-    pair: Pair, bonded: Bools, u_slave: Array, pressed: Bools | None = None
-) -> Pair | None:
+    pair: Pair, bonded: Bools, u_slave: Array, pressed: Bools | None = None, *,
+    turned: float | None = None,
+) -> Pair | None:  # fmt: skip
     """A pair with normals and gaps of its open nodes where they are now.
 
     Args:
@@ -151,6 +152,8 @@ def renewed_on(
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
         pressed: Nodes that are in contact, which follow the smallest change, shape (n_nodes,);
             ``None`` where that is not known.
+        turned: Angle by which the normal below a node turns before it is paired anew, in place of
+            what is chosen otherwise.
 
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
@@ -165,7 +168,8 @@ def renewed_on(
     over = ~bonded & (pair.paired | facing)
     near = over & (distance < NEAR * pair.surface.facet_size)
     turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
-    if not np.any(near & (has_slid(turn, pressed) | ~pair.paired)):
+    slid = has_slid(turn, pressed) if turned is None else turn > turned
+    if not np.any(near & (slid | ~pair.paired)):
         return None
     if surface.flat:
         over &= ~pair.paired  # the gaps of all others are as they were
