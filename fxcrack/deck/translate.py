@@ -154,7 +154,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         contacts.share_supports(boundary)
     constrained = turned + constraints.supports(boundary, groups)
     if explicit:
-        check_constraints(constrained, cards)
+        check_constraints(constrained, cards, flat)
     supports = boundary.displacements(groups) + constrained
     held = np.unique(
         np.concatenate(
