@@ -39,7 +39,6 @@ from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import CrackLength, Releases
 
-
 _METHODS = ("vcct", "closure", "domain")
 """How G is found in quasi-static studies."""
 

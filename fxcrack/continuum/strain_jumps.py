@@ -3,8 +3,8 @@
 The strain of finite elements jumps between cells, the true one does not. The recovered strain is
 linear between the mean values of the cells at each corner; what it differs by from the strain
 estimates the error (O. C. Zienkiewicz, J. Z. Zhu, A simple error estimator and adaptive procedure
-for practical engineering analysis, Int. J. Numer. Meth. Engng 24 (1987) 337-357). Its energy over that
-of the strain is the part by which bodies are too stiff.
+for practical engineering analysis, Int. J. Numer. Meth. Engng 24 (1987) 337-357). Its energy over
+that of the strain is the part by which bodies are too stiff.
 
 For triangles and tetrahedra of first order :mod:`fxcrack.continuum.linear_range` has the same
 without quadrature.
