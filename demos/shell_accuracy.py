@@ -28,7 +28,7 @@ from fxcrack.accuracy.study import Setting
 from fxcrack.demos.show import arguments, table
 from fxcrack.output.plots.style import COLOURS, save
 
-BUDGET = 60.0
+BUDGET = 120.0
 """Seconds of each study."""
 LOOKS = {
     "hexahedron": (COLOURS[0], "s", "solids"),
