@@ -221,3 +221,11 @@ def test_refusals(comm: MPI.Intracomm) -> None:
         explicit(strip(comm, 0.5, 4, order=2))
     with pytest.raises(fx.InputError, match="bulk viscosity"):
         explicit(strip(comm, 0.5, 4), bulk=(0.06, 1.2))
+    section = fx.Section(fx.Isotropic(E, 0.3, density=RHO), thickness=1.0)
+    plate = sheets([Sheet("flat", np.linspace(0.0, 8.0, 5), [0.0, 2.0])], comm)
+    scene = fx.Scene(
+        plate, model=fx.Shell(), materials=section, effects=[fx.Inertia()],
+        supports=[fx.Coupling("flat_a1", (8.0, 0.0, 0.0))],
+    )  # fmt: skip
+    with pytest.raises(fx.InputError, match="couplings and equations"):
+        explicit(scene)
