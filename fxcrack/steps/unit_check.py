@@ -14,6 +14,7 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.temperature_field import entries
 from fxcrack.steps.crack import Crack
 
 _TOO_SMALL = 1e-10
@@ -28,11 +29,9 @@ def warn_of_units(cracks: Sequence[Crack], continuum: Continuum, said: set[str])
         continuum: The bodies.
         said: What was warned of before; "units" is added.
     """
-    moduli = [
-        float(np.diag(np.asarray(m.stiffness())).max())
-        for m in continuum.part_materials
-        if hasattr(m, "stiffness") and np.ndim(m.stiffness()) == 2
-    ]
+    every = [m for part in continuum.part_materials for m in entries(part)]
+    stiffnesses = [np.asarray(m.stiffness()) for m in every if hasattr(m, "stiffness")]
+    moduli = [float(np.diag(c).max()) for c in stiffnesses if c.shape == (6, 6)]  # no sections
     if "units" in said or not moduli:
         return
     for g in cracks:
