@@ -144,3 +144,34 @@ def test_refusals() -> None:
         fx.VCCT(GIc=1.0, method="domain", mode_length=0.1)
     with pytest.raises(fx.InputError, match="mode_length"):
         fx.VCCT(GIc=1.0, mode_length=-0.1)
+
+
+@pytest.mark.parametrize("method", ["vcct", "closure"])
+def test_reference_length_is_for_the_domain_integral(method: str) -> None:
+    """Other methods left it out of account; ``mode_length`` is what they have."""
+    with pytest.raises(fx.InputError, match="mode_length"):
+        fx.VCCT(GIc=1.0, method=method, reference_length=0.1)
+
+
+def test_refused_where_the_fields_of_the_tip_are_not_known() -> None:
+    """Moduli that change with the temperature, continuum shells, explicit dynamics."""
+    bond = fx.Interface("upper_face", "lower_face", lambda x: x[0] >= 3.0 - 1e-9, name="bond")
+    options: dict[str, Any] = {
+        "supports": [fx.Displacement("far_upper", x=0.0, y=0.0),
+                     fx.Displacement("far_lower", x=0.0, y=0.0)],
+        "debonds": [fx.Debond(bond, fx.VCCT(GIc=1.0, mode_length=LENGTH))],
+    }  # fmt: skip
+    mesh = dcb_2d(MPI.COMM_SELF, length=6.0, height=1.0, dx=1.0, ny=1)
+    flat: dict[str, Any] = {"model": fx.PlaneStrain(), **options}
+
+    def refused(step: Any, **arguments: Any) -> str:
+        with pytest.raises(fx.InputError, match="mode_length") as error:
+            fx.Scene(mesh, **arguments).run(step, progress=False)
+        return str(error.value)
+
+    still = fx.Static(until=fx.Time(1.0))
+    table = fx.ByTemperature({0.0: METAL, 100.0: RESIN})
+    warm = [fx.Temperature(1.0, reference=0.0)]
+    assert "temperature" in refused(still, materials=table, effects=warm, **flat)
+    heavy = fx.Isotropic(70e3, 0.3, density=1e-9)
+    assert "explicit" in refused(fx.Explicit(until=fx.Time(1e-6)), materials=heavy, **flat)
