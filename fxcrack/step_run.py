@@ -25,6 +25,7 @@ from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.second_order_effects import warn_of_second_order
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
@@ -166,11 +167,15 @@ def run_step(
     analysis.history.details = _details(analysis)
     if isinstance(analysis.solver, LinearSolver) and not isinstance(step, Explicit):
         # not worth a factorisation of its own, which a direct solver needs on several ranks
-        known = analysis.solver.recovers_displacement
-        if known and not isinstance(analysis.continuum, ShellBodies):
+        if analysis.solver.recovers_displacement:
             u = analysis.solver.displacement()
-            warn_of_range(analysis.continuum, u.array_r.copy(), analysis.said)
+            now = u.array_r.copy()
             u.destroy()
+            if not isinstance(analysis.continuum, ShellBodies):
+                warn_of_range(analysis.continuum, now, analysis.said)
+            if analysis.continuum.temperature is not None:
+                analysis.continuum.temperature.set(analysis.time)
+            warn_of_second_order(analysis.solver, now, analysis.said)
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
         u = analysis.solver.displacement()
@@ -180,10 +185,11 @@ def run_step(
 
 
 def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None:
-    """Refuse a crack length to stop at that the crack exceeds before the step begins.
+    """Refuse a crack length to stop at that the crack exceeds already, or never reaches.
 
     Raises:
-        InputError: It does; a length that is just reached ends the step at once, as before.
+        InputError: It does, or the interface is shorter; a length that is just reached ends the
+            step at once.
     """
     for end in step.ends:
         if not isinstance(end, CrackLength):
@@ -196,6 +202,13 @@ def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None
                         f"CrackLength({end.length:g}): the crack of '{g.title}' is {length:g} long "
                         "already; lengths count from the end of the surface at which it is open; "
                         "give a larger one"
+                    )
+                largest = g.extent.largest
+                if end.length > largest * (1.0 + 1e-6):
+                    raise InputError(
+                        f"CrackLength({end.length:g}): the crack of '{g.title}' cannot be longer "
+                        f"than {largest:g}, when the interface is open all over; give a length up "
+                        "to that, Releases(n), or Time(t)"
                     )
 
 

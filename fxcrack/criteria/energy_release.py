@@ -88,9 +88,9 @@ class RateCriterion(Criterion):
             positive(self._owner, reference_length=self.reference_length)
             if self.method != "domain":
                 raise InputError(
-                    f"{self._owner}: reference_length = {self.reference_length:g} is a length of "
-                    f"the modes of method='domain'; those of method='{self.method}' belong to "
-                    "mode_length, about 10.9 times as long for the same modes"
+                    f"{self._owner}: reference_length = {self.reference_length:g} belongs to the "
+                    f"modes of method='domain'; with method='{self.method}' give mode_length, or "
+                    "leave it out"
                 )
         if self.mode_length is not None:
             positive(self._owner, mode_length=self.mode_length)

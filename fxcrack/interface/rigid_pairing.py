@@ -21,12 +21,9 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.interface.frames import local_frames
-from fxcrack.interface.pair import FACING, NEAR, Pair
+from fxcrack.interface.pair import FACING, NEAR, Pair, has_slid
 from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.surface import FacetSurface, facet_element
-
-_TURNED = 0.01
-"""Angle by which the normal below a node turns before it is paired anew."""
 
 
 def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
@@ -143,13 +140,20 @@ def find_partners(
     return paired, normals, gap
 
 
-def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
+def renewed_on(
+    pair: Pair, bonded: Bools, u_slave: Array, pressed: Bools | None = None, *,
+    turned: float | None = None,
+) -> Pair | None:  # fmt: skip
     """A pair with normals and gaps of its open nodes where they are now.
 
     Args:
         pair: The pair as it is, with a rigid master.
         bonded: Slave nodes that are bonded now, or whose bonds still pull, shape (n_nodes,).
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
+        pressed: Nodes that are in contact, which follow the smallest change, shape (n_nodes,);
+            ``None`` where that is not known.
+        turned: Angle by which the normal below a node turns before it is paired anew, in place of
+            what is chosen otherwise.
 
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
@@ -163,8 +167,9 @@ def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
     facing = _facing(pair.whole_surface.moved(x), normals) < FACING
     over = ~bonded & (pair.paired | facing)
     near = over & (distance < NEAR * pair.surface.facet_size)
-    turned = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _TURNED
-    if not np.any(near & (turned | ~pair.paired)):
+    turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
+    slid = has_slid(turn, pressed) if turned is None else turn > turned
+    if not np.any(near & (slid | ~pair.paired)):
         return None
     if surface.flat:
         over &= ~pair.paired  # the gaps of all others are as they were
