@@ -102,7 +102,12 @@ class CrackPressure:
         return self._pair[0]
 
     @property
-    def _surface(self) -> FacetSurface:
+    def takes(self) -> Bools:
+        """Slave nodes that take forces: those that may open, shape (n_nodes,)."""
+        return self._takes[0]
+
+    @property
+    def surface(self) -> FacetSurface:
         """The slave surface by facets of the order of the bodies."""
         pair = self.pair
         if pair.hierarchy is None:
@@ -117,19 +122,14 @@ class CrackPressure:
     def _facet_forces(self) -> Array:
         """Forces at amplitude 1 on the slave nodes of each facet, (n_facets, n_nodes, gdim)."""
         if not self._shares:
-            surface, gdim = self._surface, self.pair.frames.shape[1]
+            surface, gdim = self.surface, self.pair.frames.shape[1]
             cell = getattr(basix.CellType, surface.kind)
             points, weights = basix.make_quadrature(cell, 2 * surface.order + 2)
             xi = np.asarray(points)
             values, _ = shape_functions(surface.kind, surface.order, xi)
             normal, size = surface.facet_normals(xi)
             x = np.einsum("mk,fkc->fmc", values, surface.x[surface.facets])
-            if callable(self.value):
-                where = f"pressure '{self.title}'"
-                pressure = numbers_at(where, "value", self.value, x.reshape(-1, 3))
-                pressure = pressure.reshape(x.shape[:2])
-            else:
-                pressure = np.full(x.shape[:2], float(self.value))
+            pressure = self._values(x)
             breadth = surface.breadth[surface.facets] @ values.T
             each = weights * size * breadth * pressure
             out = -np.einsum("fm,mk,fmc->fkc", each, values, normal[..., :gdim])
@@ -137,8 +137,28 @@ class CrackPressure:
             self._shares.append(out)
         return self._shares[0]
 
+    def _values(self, x: Array) -> Array:
+        """The pressure at amplitude 1 at positions, shape (..., 3) to (...)."""
+        if not callable(self.value):
+            return np.full(x.shape[:-1], float(self.value))
+        where = f"pressure '{self.title}'"
+        return numbers_at(where, "value", self.value, x.reshape(-1, 3)).reshape(x.shape[:-1])
+
+    def values_at(self, xi: Array) -> Array:
+        """The pressure at amplitude 1 at reference points of every facet.
+
+        Args:
+            xi: Shape (m, dim).
+
+        Returns:
+            Shape (n_facets, m), force/length^2.
+        """
+        surface = self.surface
+        shape, _ = shape_functions(surface.kind, surface.order, xi)
+        return self._values(np.einsum("mk,fkc->fmc", shape, surface.x[surface.facets]))
+
     def _at_nodes(self, chosen: Bools | None = None) -> Array:
-        surface = self._surface
+        surface = self.surface
         forces, facets = self._facet_forces(), surface.facets
         if chosen is not None:
             forces, facets = forces[chosen], facets[chosen]
@@ -155,11 +175,16 @@ class CrackPressure:
         Returns:
             Shape (n_nodes, gdim), force.
         """
-        out = self._at_nodes(bonded[self._surface.facets].all(axis=1))
-        if self.pair.hierarchy is not None:
-            # forces on jumps: those of midside nodes act on the jumps of both their corners
-            midsides, ends = self.pair.hierarchy.midsides, self.pair.hierarchy.ends
-            np.add.at(out, ends, 0.5 * out[midsides][:, None, :])
+        return self.on_jumps(self._at_nodes(bonded[self.surface.facets].all(axis=1)))
+
+    def on_jumps(self, forces: Array) -> Array:
+        """Forces on the jumps of the slave nodes by those on the nodes, (n_nodes, gdim) both.
+
+        The force of a midside node of second-order tetrahedra acts on the jumps of its corners.
+        """
+        hierarchy, out = self.pair.hierarchy, forces.copy()
+        if hierarchy is not None:
+            np.add.at(out, hierarchy.ends, 0.5 * forces[hierarchy.midsides][:, None, :])
         return out
 
     def vector(self, continuum: Continuum) -> PETSc.Vec:
