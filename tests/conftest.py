@@ -34,7 +34,7 @@ import hypothesis
 import pytest
 from mpi4py import MPI
 
-from fxcrack.base import collective_garbage
+from fxcrack.base import collective_garbage, log
 from fxcrack.base.parallel import end_all
 
 # Same examples on every rank and in every run; compilation of forms makes first examples slow.
@@ -270,3 +270,12 @@ def _free_petsc_objects() -> Iterator[None]:
     gc.collect()
     collective_garbage.collect(WORLD)
     WORLD.Barrier()
+
+
+@pytest.fixture(autouse=True)
+def _log_is_as_before() -> Iterator[None]:
+    """Give the log back the level and the handlers that a test has changed."""
+    level, handlers = log.logger.level, log.logger.handlers[:]
+    yield
+    log.logger.setLevel(level)
+    log.logger.handlers[:] = handlers
