@@ -211,7 +211,7 @@ class RingBuilder:
         area = line.widths(tips, i)
         if gdim == 2:
             area = float(continuum.model.breadth(origin[None])[0])
-        # half a ring: the other half holds as much of J and of K_I, which here are per half the area
+        # half a ring: J and K_I of the other half are the same, as if over half the area
         area /= self._halves
         opening = opened_facets(front.surface, front.bonded, opened, nodes, cells, q)
         # jumps are those of the whole crack
