@@ -192,11 +192,10 @@ def run_step(
 
 
 def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None:
-    """Refuse a crack length to stop at that the crack exceeds already, or never reaches.
+    """Refuse a crack length that the crack exceeds already; warn of one it never reaches.
 
     Raises:
-        InputError: It does, or the interface is shorter; a length that is just reached ends the
-            step at once.
+        InputError: It does; a length that is just reached ends the step at once.
     """
     for end in step.ends:
         if not isinstance(end, CrackLength):
@@ -212,11 +211,11 @@ def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None
                     )
                 largest = g.extent.largest
                 if end.length > largest * (1.0 + 1e-6):
-                    raise InputError(
-                        f"CrackLength({end.length:g}): the crack of '{g.title}' cannot be longer "
-                        f"than {largest:g}, when the interface is open all over; give a length up "
-                        "to that, Releases(n), or Time(t)"
-                    )
+                    log.warn(
+                        "CrackLength(%g): the crack of '%s' cannot be longer than %g, when the "
+                        "interface is open all over; the step ends then at the latest",
+                        end.length, g.title, largest,
+                    )  # fmt: skip
 
 
 def _prepare(
