@@ -104,7 +104,6 @@ def test_cooling_on_both_paths() -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.three
 @pytest.mark.parametrize("effects", [[], [fx.FiniteStrain()]], ids=["small", "finite"])
 @pytest.mark.parametrize("held", [True, False])
 def test_energy_of_motions_that_begin_warm(

@@ -301,8 +301,25 @@ class DirectCondensation:
         Returns:
             u on the displacement dofs; the caller destroys it.
         """
+        return self._moved(last, None)
+
+    def displacement_beside(self, inner: PETSc.Vec, last: Array) -> PETSc.Vec:
+        """Displacements for given last coordinates beside those of forces; collective.
+
+        Args:
+            inner: A_11^-1 r_1 from :meth:`reduced`; stays with the caller.
+            last: As in :meth:`displacement`.
+
+        Returns:
+            u on the displacement dofs; the caller destroys it.
+        """
+        return self._moved(last, inner)
+
+    def _moved(self, last: Array, inner: PETSc.Vec | None) -> PETSc.Vec:
         start = time.perf_counter()
         q = self.expanded(last)
+        if inner is not None:
+            q.axpy(1.0, inner)
         u = self.coordinates.transform.createVecLeft()
         self.coordinates.transform.mult(q, u)
         q.destroy()
