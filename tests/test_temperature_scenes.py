@@ -104,18 +104,20 @@ def test_cooling_on_both_paths() -> None:
 
 
 @pytest.mark.mpi
-@pytest.mark.parametrize("effects", [[], [fx.FiniteStrain()]], ids=["small", "finite"])
+@pytest.mark.parametrize("bodies", ["small", "finite", "plastic"])
 @pytest.mark.parametrize("held", [True, False])
-def test_energy_of_motions_that_begin_warm(
-    comm: MPI.Intracomm, held: bool, effects: list[Any]
-) -> None:
+def test_energy_of_motions_that_begin_warm(comm: MPI.Intracomm, held: bool, bodies: str) -> None:
     """Arms of two materials, warm from the first moment on and then cooled."""
     supports = [fx.Displacement("pin_bottom", x=0.0, y=0.0), fx.Displacement("pin_top", x=0.0)]
     warm = fx.Temperature([(0.0, 500.0), (5e-3, 500.0), (1e-2, -300.0)])
+    upper: Any = fx.Isotropic(7e4, 0.3, 2e-4, 1e-3)
+    if bodies == "plastic":
+        upper = fx.Plastic(7e4, 0.3, yield_stress=1e3, hardening=1e3, expansion=2e-4, density=1e-3)
+    effects: list[Any] = [fx.FiniteStrain()] if bodies == "finite" else []
     scene = fx.Scene(
         dcb_2d(comm, length=10.0, dx=2.5, ny=1),
         materials={
-            "upper": fx.Isotropic(7e4, 0.3, 2e-4, 1e-3), "lower": fx.Isotropic(7e4, 0.3, 1e-5, 1e-3)
+            "upper": upper, "lower": fx.Isotropic(7e4, 0.3, 1e-5, 1e-3)
         },
         model=fx.PlaneStrain(),
         supports=supports if held else [],

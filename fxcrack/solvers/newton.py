@@ -192,6 +192,7 @@ class NewtonSolver(InterfaceSolver):
             self._solve(zero)
         elif self.continuum.temperature is not None:
             self.continuum.temperature.clear()
+            self.bodies.set(self.u)
 
     def _solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
