@@ -14,7 +14,7 @@ from rich.console import Console
 
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.machine import peak_memory
-from fxcrack.bench import explicit, measure
+from fxcrack.bench import explicit, explicit_ranks, measure
 from fxcrack.bench.problem import LENGTHS, Problem
 from fxcrack.bench.speed import run
 from fxcrack.bench.tables import show_explicit, show_speed
@@ -208,3 +208,18 @@ def test_increments_of_explicit_dynamics_are_measured_beside_products() -> None:
     assert "one sparse product" in buffer.getvalue()
     with pytest.raises(InputError, match="at least 1"):
         explicit.run(small, COMM, increments=0)
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+def test_gains_of_ranks_beside_processes_that_share_nothing(comm: MPI.Intracomm) -> None:
+    small = explicit.Case("tiny", 2, 40.0, 2.0, 1)
+    if comm.size == 1:
+        with pytest.raises(InputError, match="two ranks or more"):
+            explicit_ranks.compare(small, comm)
+        return
+    result = explicit_ranks.compare(small, comm, repeat=1, increments=3)
+    assert result["ranks"] == comm.size
+    gain = result["ms_one"] / result["ms_together"]
+    assert result["gain_together"] == pytest.approx(gain) and gain > 0.0
+    assert result["gain_apart"] == pytest.approx(comm.size * result["ms_one"] / result["ms_apart"])
