@@ -13,7 +13,7 @@ from fxcrack.base.checks import is_function, list_of
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.linear_range import warn_of_range
+from fxcrack.continuum.linear_range import warn_of_large_strain, warn_of_range
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.effects import is_finite
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -41,6 +41,7 @@ from fxcrack.steps.rows import Observer
 from fxcrack.steps.share_done import ShareDone
 from fxcrack.steps.solver_work import SolverWork
 from fxcrack.steps.static import Dynamic, Static
+from fxcrack.steps.unit_check import warn_of_units
 
 
 def check_step(
@@ -151,6 +152,7 @@ def run_step(
     _check_lengths(analysis, step)
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
     check_same_call(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
+    warn_of_units(analysis.active, analysis.continuum, analysis.said)
     restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
     try:
         _prepare(analysis, restarts, may_grow, step)
@@ -176,6 +178,11 @@ def run_step(
             if analysis.continuum.temperature is not None:
                 analysis.continuum.temperature.set(analysis.time)
             warn_of_second_order(analysis.solver, now, analysis.said)
+    if any(getattr(m, "form", "") == "plastic" for m in analysis.continuum.part_materials):
+        u = analysis.solver.displacement()
+        now = u.array_r.copy()
+        u.destroy()
+        warn_of_large_strain(analysis.continuum, now, analysis.said)
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
         u = analysis.solver.displacement()
