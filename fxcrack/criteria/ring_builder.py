@@ -29,6 +29,8 @@ from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import gather_surface
 from fxcrack.interface.tips import Tips
 
+_OPENING = 1
+"""Place of mode I among the fields of a tip."""
 _STRAIGHT = 30.0
 """Turn of the front from one element to the next above which single nodes are not reliable
 [degrees]; a circle has 15 with 24 elements around it."""
@@ -86,8 +88,10 @@ class RingBuilder:
         self._on_faces = loads_on_faces(continuum, self._loads)
         self._slaves = probe.pair.surface.dofs
         master = probe.pair.sides[1]
-        assert isinstance(master, str | Face)  # rigid surfaces are refused before
-        self._masters = gather_surface(continuum, master).dofs
+        self._masters = np.zeros(0, dtype=np.int64)  # a plane of symmetry has no nodes
+        if isinstance(master, str | Face):
+            self._masters = gather_surface(continuum, master).dofs
+        self._halves = probe.pair.interface.opening_factor
         self._ring = isinstance(continuum.model, Axisymmetric)
         self._thickness = float(getattr(continuum.model, "thickness", 1.0))
         self._n_modes = 2 if probe.gdim == 2 else 3
@@ -286,6 +290,10 @@ class RingBuilder:
         opening = opened_facets(
             front.surface, front.bonded, at.opened, nodes, cells, wide, self._probe.pair.hierarchy
         )
+        # half a ring: J and K_I of the other half are the same, as if over half the area; jumps are
+        # those of the whole crack
+        area /= self._halves
+        opening = replace(opening, weights=opening.weights / self._halves)
         # as the bodies have it
         plain = CellGeometry(cells, continuum.degree, ring=self._ring, thickness=self._thickness)
         volume = plain.weight
@@ -351,6 +359,10 @@ class RingBuilder:
         for mode in range(m):
             np.add.at(by_node[mode], of_cell, each[mode])
         energy = fields.energy[:m, :m]
+        if self._halves > 1.0:
+            # modes II and III of one half are the negative of those of the other
+            for weights in (by_node, by_rise, by_load):
+                weights[np.arange(m) != _OPENING] = 0.0
         return Interaction(by_node, by_rise, by_load, energy, fields.oscillation)
 
     def _own_facets(self, cells: FrontCells) -> Bools:
