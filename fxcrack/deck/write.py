@@ -40,21 +40,14 @@ from fxcrack.continuum.loads import (
 from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
 from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import Temperature
-from fxcrack.criteria import (
-    AmplitudeRelease,
-    CrackLengthVsTime,
-    CrackOpening,
-    CriticalStress,
-    RampRelease,
-    StepRelease,
-)
 from fxcrack.deck.gather import Gathered, gather
 from fxcrack.deck.lines import broken, number, set_lines
 from fxcrack.deck.procedures import DeckStep
 from fxcrack.deck.write_constraints import coupling_lines, equation_lines
+from fxcrack.deck.write_debond import debond_lines
 from fxcrack.deck.write_explicit import explicit_interface
 from fxcrack.deck.write_mesh import MeshLines
-from fxcrack.deck.write_properties import criterion_lines, material_lines
+from fxcrack.deck.write_properties import material_lines
 from fxcrack.deck.write_shells import section_lines
 from fxcrack.deck.write_steps import ends_of, refuse, step_lines
 from fxcrack.effects import FiniteStrain
@@ -290,7 +283,7 @@ class _Writer:
         found = explicit_interface(
             interface,
             None if debond is None else debond.criterion,
-            debond.release if debond is not None and debond.release_chosen else None,
+            None if debond is None else debond.release,
             bonded=bool(pair.bonded.any()),
             nodal=at is not None and self.toughness[at] is not None,
             thickness=self._thickness(),
@@ -488,7 +481,8 @@ class _Writer:
             if explicit and not grows:
                 refuse(f"step '{step.name}', in which '{debond.interface.title}' may not grow")
             if grows and not explicit:
-                out += self._debond(debond, self.toughness[i] is not None)
+                nodal = self.toughness[i] is not None
+                out += debond_lines(debond, step.step, self.scene.pairs, nodal=nodal)
         monitors = [line for m in self.scene.input.monitors for line in self._monitor(m)]
         if monitors:
             out += ["*OUTPUT, HISTORY", *monitors]
@@ -504,24 +498,6 @@ class _Writer:
         ):
             return []
         return [f'*NODE OUTPUT, NSET="{monitor.where}"', f"U{axes[0] + 1}"]
-
-    def _debond(self, debond: Debond, nodal: bool) -> list[str]:
-        title, release = debond.interface.title, debond.release
-        head = f'*DEBOND, SLAVE="{title}", MASTER="{title} master", FREQUENCY=1'
-        lines: list[str] = []
-        old = isinstance(debond.criterion, CriticalStress | CrackOpening | CrackLengthVsTime)
-        if isinstance(release, AmplitudeRelease):
-            pairs = zip(release.times, release.fractions, strict=True)
-            lines = broken([number(x) for pair in pairs for x in pair], 8, comma=False)
-            if release.first_increment is not None:
-                head += f", TIME INCREMENT={number(release.first_increment)}"
-        elif isinstance(release, RampRelease) and release.increments is None and not old:
-            head += ", DEBONDING FORCE=RAMP"
-        elif not isinstance(release, StepRelease):
-            refuse(f"interface '{title}': the release law {release}")
-        if debond.temperature is not None or debond.watch:
-            refuse(f"interface '{title}': temperature= and watch= of a Debond")
-        return [head, *lines, *criterion_lines(title, debond.criterion, nodal)]
 
 
 def _type(interface: Interface) -> str:
