@@ -10,7 +10,7 @@ demo: $(ready) ## grow a crack through a double cantilever beam; plots in out/dc
 smoke: $(ready) ## the essential path, in a minute
 	.ci/test smoke
 
-test: $(ready) ## quick tests: in serial, on 2 and on 3 ranks
+test: $(ready) ## quick tests: in serial, and half of the parallel ones each on 2 and on 3 ranks
 	.ci/test quick
 
 test-slow: $(ready) ## the others: verification, convergence, hard cases, and the rest on each number of ranks

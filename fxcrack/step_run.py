@@ -180,10 +180,11 @@ def run_step(
 
 
 def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None:
-    """Refuse a crack length to stop at that the crack exceeds before the step begins.
+    """Refuse a crack length to stop at that the crack exceeds already, or never reaches.
 
     Raises:
-        InputError: It does; a length that is just reached ends the step at once, as before.
+        InputError: It does, or the interface is shorter; a length that is just reached ends the
+            step at once.
     """
     for end in step.ends:
         if not isinstance(end, CrackLength):
@@ -196,6 +197,13 @@ def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None
                         f"CrackLength({end.length:g}): the crack of '{g.title}' is {length:g} long "
                         "already; lengths count from the end of the surface at which it is open; "
                         "give a larger one"
+                    )
+                largest = g.extent.largest
+                if end.length > largest * (1.0 + 1e-6):
+                    raise InputError(
+                        f"CrackLength({end.length:g}): the crack of '{g.title}' cannot be longer "
+                        f"than {largest:g}, when the interface is open all over; give a length up "
+                        "to that, Releases(n), or Time(t)"
                     )
 
 

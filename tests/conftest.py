@@ -22,6 +22,7 @@ import gc
 import signal
 import sys
 import time
+import zlib
 from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import TextIO
@@ -33,7 +34,7 @@ import hypothesis
 import pytest
 from mpi4py import MPI
 
-from fxcrack.base import collective_garbage
+from fxcrack.base import collective_garbage, log
 from fxcrack.base.parallel import end_all
 
 # Same examples on every rank and in every run; compilation of forms makes first examples slow.
@@ -169,26 +170,48 @@ def pytest_pycollect_makeitem(
 
 @pytest.hookimpl(trylast=True)  # after those that -m leaves out
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    """With FXCRACK_TEST_SPREAD, leave parameters of a test in turn to the run on 2 or on 3 ranks.
+    """With FXCRACK_TEST_SPREAD, leave some tests to the run on another number of ranks.
 
-    Every test then still runs on both, each of its parameters on one of them: one in three on 3
-    ranks, which share the two cores of a small machine. What bears the mark "each" is not spread.
+    "quick": every other test runs on 2 ranks and the rest on 3. "slow": these tests run on the
+    number of ranks they did not have. Of the others, those without parameters all run on 2 ranks
+    and every other one of a file on 3, which share the two cores of a small machine; those with
+    parameters run on both, two thirds of the parameters on 2 ranks and one on 3. What bears the
+    mark "each" is not spread.
     """
-    if "FXCRACK_TEST_SPREAD" not in os.environ or WORLD.size not in (2, 3):
+    spread = os.environ.get("FXCRACK_TEST_SPREAD")
+    if spread is None or WORLD.size not in (2, 3):
         return
-    tests: dict[str, list[pytest.Item]] = {}
+    left = []
+    functions: dict[str, dict[str, list[pytest.Item]]] = {}
     for item in items:
-        tests.setdefault(item.nodeid.partition("[")[0], []).append(item)
-    left = [
-        item
-        for same in tests.values()
-        for i, item in enumerate(same)
-        if len(same) > 1
-        and (i % (3 if len(same) > 2 else 2) == 0) != (WORLD.size == 3)
-        and not item.get_closest_marker("each")
-    ]
+        each = item.get_closest_marker("each") is not None
+        if _is_quick_on_ranks(item):
+            here = each or _ranks_when_quick(item) == WORLD.size
+            if here != (spread == "quick"):
+                left.append(item)
+        elif not each:
+            file, _, name = item.nodeid.partition("::")
+            functions.setdefault(file, {}).setdefault(name.partition("[")[0], []).append(item)
+    for of_file in functions.values():
+        singles = 0
+        for same in of_file.values():
+            if len(same) == 1:
+                singles += 1
+                left += same if WORLD.size == 3 and singles % 2 == 0 else []
+                continue
+            every = 3 if len(same) > 2 else 2
+            left += [item for i, item in enumerate(same) if (i % every == 0) != (WORLD.size == 3)]
     config.hook.pytest_deselected(items=left)
     items[:] = [item for item in items if item not in left]
+
+
+def _is_quick_on_ranks(item: pytest.Item) -> bool:
+    return bool(item.get_closest_marker("three")) and not item.get_closest_marker("slow")
+
+
+def _ranks_when_quick(item: pytest.Item) -> int:
+    """2 or 3, the same whatever else is collected."""
+    return 2 + zlib.crc32(item.nodeid.encode()) % 2
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
@@ -247,3 +270,12 @@ def _free_petsc_objects() -> Iterator[None]:
     gc.collect()
     collective_garbage.collect(WORLD)
     WORLD.Barrier()
+
+
+@pytest.fixture(autouse=True)
+def _log_is_as_before() -> Iterator[None]:
+    """Give the log back the level and the handlers that a test has changed."""
+    level, handlers = log.logger.level, log.logger.handlers[:]
+    yield
+    log.logger.setLevel(level)
+    log.logger.handlers[:] = handlers

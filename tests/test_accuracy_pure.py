@@ -40,6 +40,7 @@ def test_the_front_is_beaten_by_nobody_and_beats_everybody(
         assert not np.any((t < t[i]) & (e <= e[i]))
 
 
+@pytest.mark.slow
 @given(points, st.floats(0.0, 0.5))
 def test_each_step_of_the_front_saves_its_share(
     found: list[tuple[float, float]], gain: float

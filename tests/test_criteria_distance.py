@@ -129,6 +129,7 @@ def test_missing_shear_strength_has_no_effect(nothing: Any) -> None:
     assert criterion.value([[5.0, 1e6, -1e6]]) == pytest.approx([0.5])
 
 
+@pytest.mark.slow
 @given(tractions, st.floats(1.01, 10.0), st.integers(-200, 200))
 def test_critical_stress_grows_with_load_in_any_units(t: Array, load: float, decades: int) -> None:
     criterion = CriticalStress(10.0, 20.0, 30.0, distance=1.0)

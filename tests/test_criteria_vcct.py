@@ -89,6 +89,7 @@ def test_midside_term_of_the_singular_field_does_not_depend_on_the_spacing() -> 
     assert g == pytest.approx(np.full(3, g[0]), rel=ROUND_OFF)
 
 
+@pytest.mark.slow
 @given(pairs, pairs, lengths, lengths, lengths, of_any_order)
 def test_second_order_without_midside_nodes_is_first_order(
     f: Array, w: Array, ahead: Array, behind: Array, width: Array, kind: Any
@@ -111,6 +112,7 @@ def test_signs() -> None:
     assert energy_release_rates(pressed, closed, 1.0, 1.0, 1.0)[0, 0] == 0.0
 
 
+@pytest.mark.slow
 @given(pairs, pairs, lengths, lengths, st.floats(0.0, 2.0 * np.pi), of_any_order)
 def test_turning_the_tangents_keeps_the_shear_rate_and_bk(
     f: Array, w: Array, ahead: Array, behind: Array, angle: float, kind: Any
@@ -128,6 +130,7 @@ def test_turning_the_tangents_keeps_the_shear_rate_and_bk(
     )
 
 
+@pytest.mark.slow
 @given(vectors, vectors, lengths, lengths, kinds)
 def test_reversing_a_tangent_changes_nothing(
     f: Array, w: Array, ahead: Array, behind: Array, kind: Any
@@ -139,6 +142,7 @@ def test_reversing_a_tangent_changes_nothing(
         )
 
 
+@pytest.mark.slow
 @given(vectors, vectors, lengths, lengths, kinds, st.integers(-60, 60), st.integers(-60, 60))
 def test_any_units_of_rates(
     f: Array, w: Array, ahead: Array, behind: Array, kind: Any, force: int, length: int

@@ -287,6 +287,7 @@ def test_an_unstable_increment_is_said_in_words_of_the_deck(tmp_path, caplog):
     deck.scene.close()
 
 
+@pytest.mark.slow
 def test_sudden_heat_lets_a_plate_swing_about_its_new_length(tmp_path):
     """A free plate of the same expansion everywhere: waves of 2 alpha T L at most, mean alpha T."""
     cards = "*TEMPERATURE\nALL, 1.\n*NODE PRINT, NSET=RIGHT\nU1\n"
@@ -356,6 +357,7 @@ def test_velocities_that_vary_and_those_that_cannot_be(tmp_path):
         read(tmp_path, faces)
 
 
+@pytest.mark.slow
 def test_what_is_written_gives_the_same_history(tmp_path):
     moving = {"materials": fx.Isotropic(70e3, 0.3), "supports": [
         fx.Displacement("far_upper", x=0.0, y=0.0), fx.Displacement("far_lower", x=0.0, y=0.0)],

@@ -64,6 +64,7 @@ def test_decks_that_are_cut_off(text, end):
     check(text[: end % (len(text) + 1)])
 
 
+@pytest.mark.slow
 @FUZZ
 @given(st.sampled_from(BASE), st.data())
 def test_decks_whose_lines_are_lost_repeated_or_exchanged(text, data):
@@ -80,6 +81,7 @@ def test_decks_whose_lines_are_lost_repeated_or_exchanged(text, data):
     check("\n".join(lines))
 
 
+@pytest.mark.slow
 @FUZZ
 @given(st.sampled_from(BASE), st.data())
 def test_decks_with_other_words(text, data):
@@ -108,6 +110,7 @@ def test_decks_of_lines_at_random(lines):
     check("\n".join(lines))
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(st.text(max_size=60))
 def test_texts_that_are_no_decks(text):

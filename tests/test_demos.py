@@ -186,6 +186,7 @@ def test_front3d_progressive_release_spends_the_toughness():
     assert balanced(scene.history)
 
 
+@pytest.mark.slow
 def test_center_crack_closes_the_circle():
     scenes, columns = center_crack.run(n_crack=10, releases=4, width=10.0)
     # the required 1e-6 between the three criteria
@@ -194,6 +195,7 @@ def test_center_crack_closes_the_circle():
     assert all(balanced(scene.history) for scene in scenes)
 
 
+@pytest.mark.slow
 def test_two_cracks_grow_in_turn():
     scene, _ = two_cracks.run(dx=1.0, n_upper=3)
     released = [g.n_released for g in scene.cracks]

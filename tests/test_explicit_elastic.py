@@ -59,6 +59,7 @@ def test_elastic_bonds_spend_the_toughness(comm: MPI.Intracomm, nx_lower: int | 
     assert ratio == pytest.approx(0.79, abs=0.03)
 
 
+@pytest.mark.slow
 def test_stiff_bonds_are_the_exact_ones() -> None:
     exact = beam(MPI.COMM_SELF, None)
     lengths = (31.0, 32.0)

@@ -237,6 +237,7 @@ def test_plastic_waves(comm: MPI.Intracomm) -> None:
     assert imbalance(history) <= 2e-3
 
 
+@pytest.mark.slow
 def test_restart_of_bodies_that_yield(tmp_path: Path) -> None:
     def scene() -> fx.Scene:
         material = fx.Plastic(E, 0.3, yield_stress=100.0, hardening=1e3, density=RHO)
@@ -283,6 +284,7 @@ def test_what_is_refused() -> None:
     scene.close()
 
 
+@pytest.mark.slow
 def test_a_crack_grows_under_heat_and_a_following_pressure() -> None:
     """Faces of a DCB are driven by a pressure pulse that follows them; the toughness is spent."""
     pulse = fx.SmoothStep((0.0, 2e-5), (0.0, 1.0))

@@ -119,7 +119,7 @@ def test_mass_scaling_and_damping() -> None:
     assert imbalance(history) <= 1e-10
 
 
-@pytest.mark.quick("svk")
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["svk", "neo"])
 def test_finite_strain_balances(kind: str) -> None:
     effects: list[Any] = [fx.Inertia(density=2.7e-9)]
@@ -172,6 +172,7 @@ def test_axisymmetric_scene_balances() -> None:
     assert history["spent[bond]"][-1] == pytest.approx(G_IC, rel=1e-10)
 
 
+@pytest.mark.slow
 def test_restart_goes_on_as_it_would_have(tmp_path: Path) -> None:
     whole = run(beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF)))
     scene = beam(MPI.COMM_SELF, SPEED, mesh=coarse(MPI.COMM_SELF))

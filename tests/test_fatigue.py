@@ -249,6 +249,7 @@ def test_bodies_that_come_apart_end_the_step():
     scene.close()
 
 
+@pytest.mark.slow
 def test_growth_of_the_tips_is_ready_to_plot(tmp_path):
     scene = fatigue_specimen()
     history = scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, until=until_length(scene, 34.0)))

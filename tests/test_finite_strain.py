@@ -57,7 +57,7 @@ def test_shear_of_a_pressed_unit_in_a_turned_specimen() -> None:
     assert turned["GII[bond]"] == pytest.approx(checkpoint_point["GII[bond]"], rel=1e-6)
 
 
-@pytest.mark.quick("VCCT-80.0")
+@pytest.mark.slow
 @pytest.mark.parametrize("degrees", [80.0, 170.0])
 @pytest.mark.parametrize(
     ("criterion", "quantities"),

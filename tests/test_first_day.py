@@ -71,6 +71,16 @@ def test_bonded_set_in_other_units(
     assert f"{share} of its 31 slave nodes, between (0, 0, 0) and (60, 0, 0), are" in caplog.text
 
 
+def test_an_empty_bonded_set_that_should_hold_the_bodies(comm: MPI.Comm) -> None:
+    with pytest.raises(fx.FxcrackError, match="free to turn; the bonded set of interface 'bond' h"):
+        grow_to(specimen(mesh(comm), interface=bond(3e4)), 40.0)
+
+
+def test_a_crack_longer_than_its_interface(comm: MPI.Comm) -> None:
+    with pytest.raises(fx.InputError, match=r"CrackLength\(60.1\): the crack of 'bond' cannot be"):
+        grow_to(specimen(mesh(comm)), 60.1)
+
+
 def test_rows_that_do_not_exist(comm: MPI.Comm) -> None:
     history = grow_to(specimen(mesh(comm)), 34.0)
     with pytest.raises(fx.InputError, match=r"no row with a\[bond\] >= 99 among"):
@@ -113,6 +123,14 @@ def test_classes_where_their_instances_belong() -> None:
         fx.VCCT(GIc=0.2, GIIc=0.5, mix=fx.BK)
     with pytest.raises(fx.InputError, match=r"interface 'bond': release = .*is no release law"):
         fx.Debond(bond(30.0), fx.VCCT(GIc=0.2), fx.ProgressiveRelease)
+
+
+def test_one_boolean_for_all_nodes(comm: MPI.Comm) -> None:
+    one = fx.Interface("upper_face", "lower_face", bonded=lambda x: (x[0] >= 30.0).any())
+    with pytest.raises(fx.InputError, match=r"bonded gives a single .*one boolean per position"):
+        specimen(mesh(comm), interface=one)
+    every = fx.Interface("upper_face", "lower_face", bonded=lambda x: True)
+    assert specimen(mesh(comm), interface=every).solver.fronts[0].bonded.all()
 
 
 def test_bonded_by_a_chain_of_comparisons(comm: MPI.Comm) -> None:

@@ -85,6 +85,7 @@ def test_an_increment_obeys_the_laws(seed: int, m: int, d: int) -> None:
     assert_coulomb(block, load, reference, solved(block, load, reference))
 
 
+@pytest.mark.slow
 @given(seed=seeds, angle=st.floats(0.0, 6.28))
 @settings(max_examples=40)
 def test_a_turned_tangent_frame_turns_the_answer(seed: int, angle: float) -> None:

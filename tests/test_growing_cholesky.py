@@ -79,6 +79,7 @@ def test_any_sequence(steps: list[tuple[bool, int, int]], seed: int) -> None:
     assert_right(factor, matrix, rng)
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(st.integers(0, 130), st.integers(1, 5), st.integers(0, 10**6))
 def test_unrestrained_unknown_changes_nothing(n_free: int, n_extra: int, pick: int) -> None:

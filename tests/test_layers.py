@@ -10,7 +10,7 @@ import ast
 import io
 import re
 import tokenize
-from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
@@ -45,40 +45,58 @@ LEVELS = 2
 """Classes of this package above a class."""
 
 
-@pytest.fixture(scope="module")
-def modules() -> dict[str, ast.Module]:
-    """Syntax trees of the package's modules by their names without "fxcrack.".
+@dataclass
+class Module:
+    """What the rules need of one module: what it imports, and the bases of its classes.
 
-    Freed after these tests: millions of objects would make each later garbage collection take
-    most of a second.
+    The syntax trees themselves are not kept: millions of objects would make each later garbage
+    collection take most of a second.
     """
+
+    imports: set[str] = field(default_factory=set)
+    inside: set[str] = field(default_factory=set)  # of functions
+    bases: dict[str, list[str]] = field(default_factory=dict)
+
+    def read(self, node: ast.AST, in_function: bool = False) -> None:
+        """Read the statements below a node; only they have imports and classes in them."""
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.Import | ast.ImportFrom):
+                self.imports.update(imported(child))
+                self.inside.update(imported(child) if in_function else ())
+            elif isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
+                if isinstance(child, ast.ClassDef):
+                    names = [ast.unparse(b).partition("[")[0] for b in child.bases]
+                    self.bases[child.name] = [name.split(".")[-1] for name in names]
+                self.read(child, in_function or isinstance(child, ast.FunctionDef))
+
+
+@pytest.fixture(scope="module")
+def modules() -> dict[str, Module]:
+    """The package's modules by their names without "fxcrack."."""
     found = {}
     for path in sorted((ROOT / "fxcrack").rglob("*.py")):
         words = path.relative_to(ROOT / "fxcrack").with_suffix("").parts
         name = ".".join(w for w in words if w != "__init__") or "public names"
-        found[name] = ast.parse(path.read_text(encoding="utf-8"))
+        found[name] = Module()
+        found[name].read(ast.parse(path.read_text(encoding="utf-8")))
     return found
 
 
-def imports(tree: ast.AST) -> Iterator[str]:
-    """Modules that a syntax tree imports, those of fxcrack without "fxcrack."."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            found = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module in ("fxcrack", "fxcrack.output"):
-            found = [f"{node.module}.{alias.name}" for alias in node.names]
-        elif isinstance(node, ast.ImportFrom):
-            found = [node.module or ""]
-        else:
-            continue
-        for name in found:
-            yield "public names" if name == "fxcrack" else name.removeprefix("fxcrack.")
+def imported(node: ast.Import | ast.ImportFrom) -> set[str]:
+    """Modules that a statement imports, those of fxcrack without "fxcrack."."""
+    if isinstance(node, ast.Import):
+        found = [alias.name for alias in node.names]
+    elif node.module in ("fxcrack", "fxcrack.output"):
+        found = [f"{node.module}.{alias.name}" for alias in node.names]
+    else:
+        found = [node.module or ""]
+    return {"public names" if n == "fxcrack" else n.removeprefix("fxcrack.") for n in found}
 
 
-def test_no_import_runs_upwards(modules: dict[str, ast.Module]) -> None:
+def test_no_import_runs_upwards(modules: dict[str, Module]) -> None:
     found = set()
-    for name, tree in modules.items():
-        for wanted in imports(tree):
+    for name, module in modules.items():
+        for wanted in module.imports:
             here, there = name.partition(".")[0], wanted.partition(".")[0]
             arrow = f"{name} -> {wanted}"
             if there in ORDER and ORDER.index(there) > ORDER.index(here) and arrow not in ON_USE:
@@ -86,22 +104,14 @@ def test_no_import_runs_upwards(modules: dict[str, ast.Module]) -> None:
     assert sorted(found) == []
 
 
-def test_no_import_inside_a_function(modules: dict[str, ast.Module]) -> None:
-    found = set()
-    for name, tree in modules.items():
-        functions = (n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef))
-        found |= {f"{name} -> {wanted}" for f in functions for wanted in imports(f)}
+def test_no_import_inside_a_function(modules: dict[str, Module]) -> None:
+    found = {f"{name} -> {wanted}" for name, m in modules.items() for wanted in m.inside}
     assert all(any(arrow.startswith(known) for arrow in found) for known in ON_USE)
     assert sorted(a for a in found if not a.startswith(tuple(ON_USE))) == []
 
 
-def test_inheritance_is_flat(modules: dict[str, ast.Module]) -> None:
-    bases = {
-        node.name: [ast.unparse(b).partition("[")[0].split(".")[-1] for b in node.bases]
-        for tree in modules.values()
-        for node in ast.walk(tree)
-        if isinstance(node, ast.ClassDef)
-    }
+def test_inheritance_is_flat(modules: dict[str, Module]) -> None:
+    bases = {name: above for m in modules.values() for name, above in m.bases.items()}
 
     def levels(name: str) -> int:
         above = [b for b in bases[name] if b in bases]

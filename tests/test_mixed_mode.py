@@ -76,6 +76,7 @@ def test_clip_and_total() -> None:
     assert total(g).tolist() == [1.5, 0.0]
 
 
+@pytest.mark.slow
 @given(laws, rates, toughness, arrays(np.float64, (4, 3), elements=st.floats(0.0, 1e3)))
 def test_negative_rates_count_as_zero(law: MixedMode, g: Array, gc: Array, below: Array) -> None:
     negative = np.where(g == 0.0, -below, g)
@@ -83,6 +84,7 @@ def test_negative_rates_count_as_zero(law: MixedMode, g: Array, gc: Array, below
     np.testing.assert_array_equal(law.critical(negative, gc), law.critical(g, gc))
 
 
+@pytest.mark.slow
 @given(laws, rates, toughness, st.floats(1.01, 100.0))
 def test_grows_with_the_load(law: MixedMode, g: Array, gc: Array, load: float) -> None:
     f = law.ratio(g, gc)
@@ -90,6 +92,7 @@ def test_grows_with_the_load(law: MixedMode, g: Array, gc: Array, load: float) -
     assert (law.ratio(load * g, gc)[some] > f[some]).all()
 
 
+@pytest.mark.slow
 @given(laws, rates, toughness, st.integers(-250, 250))
 def test_any_units(law: MixedMode, g: Array, gc: Array, decades: int) -> None:
     unit = 10.0**decades

@@ -142,5 +142,7 @@ def test_along_a_front_and_on_any_number_of_ranks(comm: MPI.Intracomm) -> None:
 def test_refusals() -> None:
     with pytest.raises(fx.InputError, match="reference_length"):
         fx.VCCT(GIc=1.0, method="domain", mode_length=0.1)
+    with pytest.raises(fx.InputError, match="belongs to the modes of method='domain'"):
+        fx.VCCT(GIc=1.0, reference_length=0.1)
     with pytest.raises(fx.InputError, match="mode_length"):
         fx.VCCT(GIc=1.0, mode_length=-0.1)

@@ -62,6 +62,7 @@ def test_finite_strain_at_small_loads_is_linear() -> None:
     np.testing.assert_allclose(found[1], found[0], rtol=1e-3)
 
 
+@pytest.mark.slow
 def test_extremes_at_finite_strain_are_those_of_static_loads() -> None:
     """Arms that turn by 25 degrees; cycles by hand from the ranges, energies balance."""
     arms = [fx.Displacement("pin_top", y=3.0), fx.Displacement("pin_bottom", y=-3.0), *HELD_FAR]

@@ -140,6 +140,7 @@ def test_the_slip_of_flexure_grows_while_its_deflection_snaps_back() -> None:
     assert largest_imbalance(history) < 1e-10
 
 
+@pytest.mark.slow
 def test_a_controlled_deflection_is_a_prescribed_one() -> None:
     # below 0.69 L growth at a given deflection is unstable and arrests beyond
     controlled = flexure(25.0, 46.0, by_force=True, stepping="opening", opening="deflection")

@@ -192,6 +192,7 @@ def test_going_on_from_a_checkpoint_within_an_element(tmp_path: Path) -> None:
         assert again.rows[-1][name] == pytest.approx(whole.rows[-1][name], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_restart_within_a_step_goes_on_with_the_same_blocks(tmp_path: Path) -> None:
     """Where rates change much within an element blocks are short, and stay so after a restart."""
     step = fx.Cycles(maximum=0.1, ratio=0.1, until=fx.Releases(2))

@@ -135,7 +135,7 @@ HARMLESS = {
 }
 
 
-@pytest.mark.quick("all leave with a code")
+@pytest.mark.slow
 @pytest.mark.parametrize("what", HARMLESS)
 def test_programs_that_end_properly_are_left_alone(what: str) -> None:
     program, code = HARMLESS[what]

@@ -48,6 +48,7 @@ def test_the_report_holds_everything_in_one_file(comm: MPI.Intracomm, shared_pat
     assert "There were no warnings." in text
 
 
+@pytest.mark.slow
 def test_a_report_names_the_warnings_of_its_own_scene(comm: MPI.Intracomm, tmp_path: Path) -> None:
     pytest.importorskip("jinja2")
     fx.base.log.warn("said before the scene was made")

@@ -70,7 +70,7 @@ def errors(x: Array, fine: tuple[Array, Array]) -> dict[str, float]:
     return {name: float(np.abs(g / exact - 1.0).mean()) for name, g in found.items()}
 
 
-@pytest.mark.quick("nodes-0")
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 @pytest.mark.parametrize("perturbed", ["steps", "nodes"])
 def test_uneven_spacing(fine: tuple[Array, Array], perturbed: str, seed: int) -> None:

@@ -134,18 +134,20 @@ def run_scene(mesh: fx.Mesh, **changes: Any) -> None:
         scene.close()
 
 
+@pytest.mark.quick("0")
+@pytest.mark.parametrize("part", range(5))
 def test_wrong_arguments_of_scenes_and_runs(
-    mesh: fx.Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    part: int, mesh: fx.Mesh, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     found = []
-    for name in ("mesh", *PARTS, *RUN):
-        for wrong in WRONG:
-            if isinstance(wrong, Path) and name == "save":
-                continue  # a name without an ending: refused as well, below
-            problem = trouble(run_scene, {"mesh": mesh, name: wrong})
-            if problem:
-                found.append(f"{name}={described(wrong)}: {problem}")
+    every = [(name, wrong) for name in ("mesh", *PARTS, *RUN) for wrong in WRONG]
+    for name, wrong in every[part::5]:
+        if isinstance(wrong, Path) and name == "save":
+            continue  # a name without an ending: refused as well, below
+        problem = trouble(run_scene, {"mesh": mesh, name: wrong})
+        if problem:
+            found.append(f"{name}={described(wrong)}: {problem}")
     assert found == []
 
 

@@ -1,7 +1,9 @@
 """Functions of position that users give: one convention, checked wherever they are called.
 
 A function is given positions x of shape (3, n), as DOLFINx gives them, so that ``x[0]`` is the
-first coordinate of all of them, and returns n values (or one for all). The convention of earlier
+first coordinate of all of them, and returns n values (numbers: or one for all; booleans: or the
+constant ``True`` or ``False``, while a single boolean that NumPy has found says nothing of the
+other positions and is refused). The convention of earlier
 versions for toughness and interface temperature, shape (n, gdim) with ``x[:, 0]``, is recognised by
 the shape of what the function returns; it is called with a deprecation warning.
 """
@@ -111,9 +113,9 @@ def _call(
     columns = np.zeros((3, len(rows)))
     columns[:gdim] = rows.T
     m = len(rows)
-    found, problem, cause = _attempt(function, columns, m)
+    found, problem, cause = _attempt(function, columns, m, kind)
     if found is None:
-        former, _, _ = _attempt(function, rows.copy(), m)
+        former, _, _ = _attempt(function, rows.copy(), m, kind)
         if former is not None:
             warnings.warn(
                 f"{owner}: the function given as {name} takes positions of shape (n, gdim); write "
@@ -136,7 +138,7 @@ def _call(
 
 
 def _attempt(
-    function: Callable[..., Any], x: Array, n: int
+    function: Callable[..., Any], x: Array, n: int, kind: str
 ) -> tuple[npt.NDArray[Any] | None, str, Exception | None]:
     """What a function returns as an array of one value per position, or what is wrong."""
     try:
@@ -146,6 +148,8 @@ def _attempt(
         text = f"{type(caught).__name__}: {caught}".replace("{", "{{").replace("}", "}}")
         return None, "the function {name} fails: " + text, caught
     if found.shape == () and found.dtype.kind in "fiub":
+        if kind == "boolean" and not isinstance(given, bool | int | float):
+            return None, f"{{name}} gives a single {given!r}", None
         return np.broadcast_to(found, (n,)), "", None
     if found.shape == (1, n):
         return found[0], "", None

@@ -194,7 +194,15 @@ class FreeBodies:
         names = self._bodies.names()
         words = [f"{names[b]} {ways(v)}" for b, v in loose[:MOST]]
         more = f"; and {len(loose) - MOST} more" if len(loose) > MOST else ""
-        return f"supports and bonds leave {'; '.join(words)}{more}"
+        return f"supports and bonds leave {'; '.join(words)}{more}{self._without_bonds()}"
+
+    def _without_bonds(self) -> str:
+        """Interfaces whose bonded set holds no node, in words; empty if there is none."""
+        none = [p for p in self._given_jumps[0] if not p.bonded.any()]
+        if not none:
+            return ""
+        names = ", ".join(f"'{p.title}'" for p in none)
+        return f"; the bonded set of interface {names} holds none of its slave nodes"
 
     def _motions_left(
         self, members: Ints, held: sp.csr_matrix, together: sp.csr_matrix

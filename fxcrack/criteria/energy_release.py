@@ -86,6 +86,12 @@ class RateCriterion(Criterion):
             raise InputError(f"{self._owner}: rings = {self.rings}: give 1 or more, e.g. 3")
         if self.reference_length is not None:
             positive(self._owner, reference_length=self.reference_length)
+            if self.method != "domain":
+                raise InputError(
+                    f"{self._owner}: reference_length = {self.reference_length:g} belongs to the "
+                    f"modes of method='domain'; with method='{self.method}' give mode_length, or "
+                    "leave it out"
+                )
         if self.mode_length is not None:
             positive(self._owner, mode_length=self.mode_length)
             if self.method == "domain":

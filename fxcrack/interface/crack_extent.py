@@ -58,6 +58,20 @@ class CrackExtent:
         """Mean advance of the first front of a surface over an area, length."""
         return area / self._front_length if self._front_length else 0.0
 
+    @property
+    def largest(self) -> float:
+        """What the crack length cannot exceed, the interface being open all over."""
+        if not self._line:
+            return (
+                float(self._surface.areas.sum()) / self._front_length if self._front_length else 0.0
+            )
+        out = 0.0
+        for nodes, s in self._paths:
+            closed = nodes[0] == nodes[-1]
+            shared = closed or bool(self._was_bonded[nodes[[0, -1]]].all())
+            out = max(out, float(s[-1]) / (2.0 if shared else 1.0))
+        return out
+
     def lengths(self) -> list[tuple[int, float]]:
         """Tip node and crack length of every tip on a line; -1 where a run has no tip."""
         if self._known[0] != self._front.version:

@@ -15,8 +15,10 @@ on the masters accelerates the jump by H p, with a compliance H per component of
     H = sum_j B_j^2/m_j,    B = (E_s - W) T
 
 where T takes the motion of the nodes that follow nothing to that of all nodes and prescribed
-components count as infinite mass. Where every slave has one master of its own, all of this is
-indexing; otherwise sparse products.
+components count as infinite mass. Rows on a rigid surface have no masters: bonded ones rest, or
+slip along it (:mod:`fxcrack.interface.slipping_ties`). Where every slave has one master of its own,
+all of this is indexing; otherwise sparse products. Products for chosen rows are in
+:mod:`fxcrack.interface.lumped_rows`.
 """
 
 from __future__ import annotations
@@ -34,6 +36,8 @@ from fxcrack.base.sparse import Product, by_component
 from fxcrack.continuum.dof_layout import DofLayout
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
+from fxcrack.interface.rigid import RigidSurface
+from fxcrack.interface.slipping_ties import SlippingTies, refuse_masters_that_slip, slipping
 from fxcrack.interface.supported_slaves import align_frames, check_slaves
 from fxcrack.interface.supports import Supports
 from fxcrack.interface.surface import FacetSurface
@@ -64,8 +68,8 @@ class LumpedInterface:
         pairs: Interfaces.
         supports: Prescribed components.
         mass: Mass of the owned dofs, shape (n_local,).
-        masters: Master surfaces per pair that open nodes may be paired with anew; ``None`` where
-            they stay as they are, as all do by default.
+        masters: Master surfaces per pair that open nodes may be paired with anew, rigid ones among
+            them; ``None`` where they stay as they are, as all do by default.
 
     Raises:
         InterfaceError: A support holds a bonded slave but not its masters alike, a node is a slave
@@ -80,7 +84,9 @@ class LumpedInterface:
         jumped: Per pair, the slave nodes that have a jump, shape (n_slaves,).
         slave: Interface node of each row's slave, shape (n_rows,).
         paired: Whether each row has a master at present, shape (n_rows,).
+        rigid: Whether that is a rigid surface, shape (n_rows,).
         simple: Whether every slave has one master of its own.
+        separate: Whether forces on open rows move no jump but their own.
         frames: Frame of each row, columns normal and tangents, shape (n_rows, gdim, gdim).
         held: Components of these frames that supports hold, shape (n_rows, gdim).
         gap: Initial normal gap of each row, shape (n_rows,), length.
@@ -101,7 +107,7 @@ class LumpedInterface:
 
     def __init__(
         self, layout: DofLayout, pairs: Sequence[Pair], supports: Supports, mass: Array,
-        masters: Sequence[FacetSurface | None] = (),
+        masters: Sequence[FacetSurface | RigidSurface | None] = (),
     ) -> None:  # fmt: skip
         gdim = layout.gdim
         self.jumped = [p.paired.copy() for p in pairs]
@@ -109,7 +115,7 @@ class LumpedInterface:
         for p in moving:
             self.jumped[p] |= ~pairs[p].bonded  # they may come to a master later
         self.nodes = nodes = InterfaceNodes.of_pairs(
-            layout, pairs, [m for m in masters if m is not None], self.jumped,
+            layout, pairs, [m for m in masters if isinstance(m, FacetSurface)], self.jumped,
             _joined([pairs[p].surface.dofs for p in moving]),
         )  # fmt: skip
         which, value = supports.at_nodes(nodes)
@@ -144,6 +150,7 @@ class LumpedInterface:
             [np.zeros(0), *(p.gap[j] for p, j in zip(pairs, self.jumped, strict=True))]
         )
         self.version = 0
+        self.rigid, self._slips = slipping(pairs, self.row_of, self.n_rows)
         self.set_pairing(pairs)
 
     def _support_of(self, pair: Pair) -> Ints:
@@ -190,6 +197,7 @@ class LumpedInterface:
         rows = np.repeat(np.arange(self.n_rows), np.diff(self.weights.indptr))
         below = row_at[self.weights.indices]
         rows, below = rows[below >= 0], below[below >= 0]
+        refuse_masters_that_slip(self._slips, below)
         depth = np.zeros(self.n_rows, dtype=np.int64)
         for _ in range(self.n_rows + 1):
             deeper = depth.copy()
@@ -208,15 +216,18 @@ class LumpedInterface:
         """Tie some rows, shape (n_rows,), and leave the others open."""
         self.tied, self.open = tied.copy(), np.flatnonzero(~tied)
         self._ties = [
-            self._tie(np.flatnonzero(tied & (self.depth == d)))
+            self._tie(np.flatnonzero(tied & ~self._slips & (self.depth == d)))
             for d in range(int(self.depth.max(initial=0)), -1, -1)
         ]
         self._ties = [t for t in self._ties if len(t.rows)]
+        rows = np.flatnonzero(tied & self._slips)
+        self._slipping = SlippingTies(rows, self.slave[rows], self.frames[rows][:, :, 0])
         self.group_mass = self.collect(self.mass[:, None].copy())[:, 0]
         self.inverse = np.where(self.which < 0, 1.0 / self.group_mass[:, None], 0.0)
         self.version += 1
         self._following: sp.csr_matrix | None = None
         self._open_slaves = self.slave[self.open]
+        self.separate = True
         if self.simple:
             assert self.master is not None
             self._open_masters = self.master[self.open]
@@ -225,16 +236,18 @@ class LumpedInterface:
             self._accelerate_pairs()
             return
         following = self.following
-        self._accelerations = sp.csr_matrix(
-            following @ sp.diags(self.inverse.ravel()) @ following.T
-        )
-        self.accelerations = Product(self._accelerations)
+        self.accelerations = Product(following @ sp.diags(self.inverse.ravel()) @ following.T)
         motion = self._motion()
         self._jump = self.separations(self.open)
         self._jump_t = self._jump.T.tocsr()
         self._root = sp.csr_matrix(self._jump @ motion)
         self._root_t = self._root.T.tocsr()
         self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
+        self._root.eliminate_zeros()
+        if np.bincount(self._root.indices).max(initial=0) <= 1:
+            self.reach = self.compliance
+            return
+        self.separate = False
         size = abs(self._root)
         loose = self.inverse.max(axis=1, initial=0.0)  # forces of any direction, unlike supports
         sums = size @ (loose * (size.T @ np.ones(len(self.open))))
@@ -265,7 +278,10 @@ class LumpedInterface:
     def following(self) -> sp.csr_matrix:
         """Motion of the nodes by that of those that follow nothing, on components, square."""
         if self._following is None:
-            self._following = by_component(self._motion(), self.which.shape[1])
+            following = by_component(self._motion(), self.which.shape[1])
+            if len(self._slipping):
+                following = self._slipping.projection(len(self.nodes)) @ following
+            self._following = sp.csr_matrix(following)
         return self._following
 
     def _tie(self, rows: Ints) -> _Tie:
@@ -284,7 +300,7 @@ class LumpedInterface:
             leads[self.slave[self.tied]] = self.master[self.tied]
             return sp.csr_matrix((np.ones(n), leads, np.arange(n + 1)), shape=(n, n))
         keep = np.ones(n)
-        keep[self.slave[self.tied]] = 0.0
+        keep[self.slave[self.tied & ~self._slips]] = 0.0
         out = sp.csr_matrix(sp.diags(keep))
         for tie in reversed(self._ties):
             m = len(tie.rows)
@@ -292,143 +308,14 @@ class LumpedInterface:
             out = out + place @ (self.weights[tie.rows] @ out)
         return sp.csr_matrix(out)
 
-    def _collected(self) -> sp.csr_matrix:
+    def collected(self) -> sp.csr_matrix:
         """What :meth:`collect` does to the values of the nodes, as a matrix (n_nodes, n_nodes)."""
         out = sp.identity(len(self.nodes), format="csr")
         for tie in self._ties:
             out = out + self.weights[tie.rows].T @ out[tie.slaves]
         return sp.csr_matrix(out)
 
-    # -- chosen rows, as matrices on components of the nodes -----------------------------
-
-    def separations(self, rows: Ints) -> sp.csr_matrix:
-        """E_s - W of some rows, on nodes: jumps by the motion of the nodes, (n, n_nodes)."""
-        m, n = len(rows), len(self.nodes)
-        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self.slave[rows])), shape=(m, n))
-        return sp.csr_matrix(picks - self.weights[rows])
-
-    def mean_jumps(self, rows: Ints, weights: Array) -> Product:
-        """Weighted means of jumps by the motion of the nodes.
-
-        Args:
-            rows: Shape (n, k).
-            weights: Same shape; rows of weight 0 need not exist.
-
-        Returns:
-            On components of the nodes, shape (n gdim, n_nodes gdim).
-        """
-        gdim = self.which.shape[1]
-        rows = np.where(weights != 0.0, rows, 0)
-        if self.simple:
-            assert self.master is not None
-            nodes = np.hstack([self.slave[rows], self.master[rows]])[:, None, :]
-            columns = gdim * nodes + np.arange(gdim)[None, :, None]
-            data = np.repeat(np.hstack([weights, -weights]), gdim, axis=0)
-            return Product.of_rows(
-                columns.reshape(-1, nodes.shape[2]), data, gdim * len(self.nodes)
-            )
-        out = sp.csr_matrix((len(rows), len(self.nodes)))
-        for k in range(rows.shape[1]):
-            out = out + sp.diags(weights[:, k]) @ self.separations(rows[:, k])
-        return Product(by_component(out, gdim))
-
-    def jumps_along(self, rows: Ints, directions: Array) -> Product:
-        """Jumps of some rows along one direction each by the motion of the nodes.
-
-        Args:
-            rows: Shape (n,).
-            directions: Unit vectors, shape (n, gdim).
-
-        Returns:
-            On components of the nodes, shape (n, n_nodes gdim).
-        """
-        gdim = directions.shape[1]
-        if self.simple:
-            columns, data = self._pairs_along(rows, directions, 1.0, 1.0)
-            return Product.of_rows(columns, data, gdim * len(self.nodes))
-        return Product(self._along(rows, directions))
-
-    def _pairs_along(
-        self, rows: Ints, directions: Array, slave: Array | float, master: Array | float
-    ) -> tuple[Ints, Array]:
-        """Components of the nodes of pairs, and a direction times factors, (n, 2 gdim) each."""
-        assert self.master is not None
-        gdim = directions.shape[1]
-        nodes = np.stack([self.slave[rows], self.master[rows]], axis=1)
-        columns = gdim * nodes[:, :, None] + np.arange(gdim)
-        data = np.stack([slave * directions, -master * directions], axis=1)
-        return columns.reshape(-1, 2 * gdim), data.reshape(-1, 2 * gdim)
-
-    def _along(self, rows: Ints, directions: Array) -> sp.csr_matrix:
-        nodes = self.separations(rows)
-        gdim = directions.shape[1]
-        at = np.repeat(np.arange(len(rows)), np.diff(nodes.indptr))
-        data = nodes.data[:, None] * directions[at]
-        columns = gdim * nodes.indices.astype(np.int64)[:, None] + np.arange(gdim)
-        return sp.csr_matrix(
-            (data.ravel(), columns.ravel(), gdim * nodes.indptr.astype(np.int64)),
-            shape=(len(rows), gdim * len(self.nodes)),
-        )
-
-    def pull_along(self, rows: Ints, directions: Array) -> tuple[Product, Array]:
-        """What forces of open rows along one direction each do.
-
-        Args:
-            rows: Shape (n,).
-            directions: Unit vectors, shape (n, gdim).
-
-        Returns:
-            Accelerations of the nodes by such forces on the slaves and their reactions, shape
-            (n_nodes gdim, n); accelerations of the jumps along the directions, shape (n, n).
-        """
-        if self.simple:
-            assert self.master is not None
-            slave, master = self.inverse[self.slave[rows]], self.inverse[self.master[rows]]
-            columns, data = self._pairs_along(rows, directions, slave, master)
-            own = ((slave + master) * directions**2).sum(axis=1)
-            height = directions.shape[1] * len(self.nodes)
-            return Product.of_columns(columns, data, height), np.diag(own)
-        along = self._along(rows, directions)
-        push = sp.csr_matrix(self._accelerations @ along.T)
-        return Product(push), (along @ push).toarray()
-
-    def bonds_of(self, rows: Ints, prescribed: Ints) -> tuple[Product, Product | None]:
-        """Bond forces on the slaves of some tied rows, without what supports of slaves hold.
-
-        Args:
-            rows: Shape (n,).
-            prescribed: Components of the nodes whose accelerations are given, shape (m,).
-
-        Returns:
-            By the forces on the nodes, on components, shape (n gdim, n_nodes gdim); by the given
-            accelerations, shape (n gdim, m), ``None`` where there are none.
-        """
-        gdim, s = self.which.shape[1], self.slave[rows]
-        width = gdim * len(self.nodes)
-        if self.simple and not len(prescribed):
-            assert self.master is not None
-            m = self.master[rows]
-            nodes = np.stack([s, m], axis=1)[:, None, :]
-            columns = gdim * nodes + np.arange(gdim)[None, :, None]
-            share = self.mass[s, None] * self.inverse[m]
-            data = np.stack([share - 1.0, share], axis=2)
-            return Product.of_rows(columns.reshape(-1, 2), data.reshape(-1, 2), width), None
-        at = (gdim * s[:, None] + np.arange(gdim)).ravel()
-        mass = sp.diags(np.repeat(self.group_mass[s], gdim))
-        if self.depth.any():
-            own = by_component(self._collected()[s], gdim)
-        else:
-            n = len(at)
-            own = sp.csr_matrix((np.ones(n), at, np.arange(n + 1)), shape=(n, width))
-        force = mass @ self.accelerations.matrix()[at] - own
-        given = mass @ self.following[at][:, prescribed]
-        held = self.held[rows]
-        if held.any():
-            frames = self.frames[rows]
-            free = np.einsum("nci,ni,ndi->ncd", frames, ~held, frames)
-            project = sp.block_diag(list(free), format="csr")
-            force, given = project @ force, project @ given
-        return Product(force), Product(given)
+    # -- motion and forces of the nodes --------------------------------------------------
 
     def collect(self, values: Array) -> Array:
         """Add to the masters what tied slaves give them, in place.
@@ -451,6 +338,8 @@ class LumpedInterface:
                 values[tie.slaves] = values[tie.masters]
             elif tie.weights is not None:
                 values[tie.slaves] = tie.weights[0] @ values
+        if len(self._slipping):
+            self._slipping.follow(values)
         return values
 
     def bond_forces(self, acceleration: Array, total: Array) -> tuple[Ints, Array]:
@@ -468,6 +357,11 @@ class LumpedInterface:
             s = tie.slaves
             rows.append(tie.rows)
             forces.append(self.group_mass[s, None] * acceleration[s] - total[s])
+        if len(self._slipping):
+            s = self._slipping.slaves
+            held = self.group_mass[s, None] * acceleration[s] - total[s]
+            rows.append(self._slipping.rows)
+            forces.append(self._slipping.along_normals(held))
         if len(rows) == 1:
             return rows[0], forces[0]
         return _joined(rows), _stacked_vectors(forces, acceleration.shape[1])
@@ -481,13 +375,19 @@ class LumpedInterface:
         if self.simple:
             return 0.0
         square = (velocity**2).sum(axis=1)
-        slaves = self.slave[self.tied]
+        slaves = self.slave[self.tied & ~self._slips]
         root = np.ones(len(self.nodes), dtype=bool)
         root[slaves] = False
         more = float((self.group_mass - self.mass)[root] @ square[root])
         return 0.5 * (more - float(self.mass[slaves] @ square[slaves]))
 
     # -- open rows -----------------------------------------------------------------------
+
+    def separations(self, rows: Ints) -> sp.csr_matrix:
+        """E_s - W of some rows, on nodes: jumps by the motion of the nodes, (n, n_nodes)."""
+        m, n = len(rows), len(self.nodes)
+        picks = sp.csr_matrix((np.ones(m), (np.arange(m), self.slave[rows])), shape=(m, n))
+        return sp.csr_matrix(picks - self.weights[rows])
 
     def jumps(self, values: Array) -> Array:
         """Jumps of the open rows in a motion of the nodes, shape (n_open, gdim)."""

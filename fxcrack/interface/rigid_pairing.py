@@ -143,13 +143,16 @@ def find_partners(
     return paired, normals, gap
 
 
-def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
+def renewed_on(
+    pair: Pair, bonded: Bools, u_slave: Array, *, turned: float = _TURNED
+) -> Pair | None:
     """A pair with normals and gaps of its open nodes where they are now.
 
     Args:
         pair: The pair as it is, with a rigid master.
         bonded: Slave nodes that are bonded now, or whose bonds still pull, shape (n_nodes,).
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
+        turned: Angle by which the normal below a node turns before it is paired anew.
 
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
@@ -163,8 +166,8 @@ def renewed_on(pair: Pair, bonded: Bools, u_slave: Array) -> Pair | None:
     facing = _facing(pair.whole_surface.moved(x), normals) < FACING
     over = ~bonded & (pair.paired | facing)
     near = over & (distance < NEAR * pair.surface.facet_size)
-    turned = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1) > _TURNED
-    if not np.any(near & (turned | ~pair.paired)):
+    turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
+    if not np.any(near & ((turn > turned) | ~pair.paired)):
         return None
     if surface.flat:
         over &= ~pair.paired  # the gaps of all others are as they were

@@ -44,7 +44,9 @@ from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_accounts import EnergyAccounts
 from fxcrack.solvers.explicit_bodies import BodyMotion
+from fxcrack.solvers.explicit_checkpoints import MotionCheckpoints
 from fxcrack.solvers.explicit_energies import MotionEnergies, sums_over_ranks
+from fxcrack.solvers.explicit_fields import MotionFields
 from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_ghosts import GhostMotion
 from fxcrack.solvers.explicit_interface import dynamics_of
@@ -56,7 +58,7 @@ from fxcrack.solvers.explicit_points import FacePoints
 from fxcrack.solvers.explicit_present import PresentInterface
 from fxcrack.solvers.explicit_probe import ExplicitFrontProbe
 from fxcrack.solvers.explicit_stability import Stability
-from fxcrack.solvers.explicit_state import Arrays, InterfaceSnapshot, MotionFiles, MotionSnapshot
+from fxcrack.solvers.explicit_state import Arrays, InterfaceSnapshot, MotionSnapshot
 from fxcrack.solvers.explicit_supports import PrescribedMotion
 from fxcrack.solvers.options import ExplicitOptions
 from fxcrack.solvers.stable_increment import chosen_increment
@@ -152,7 +154,12 @@ class ExplicitSolver:
         # coordinates at the start of the present increment and at its end
         self._now: Array | None = None
         self._then = np.zeros(self.n_loads)
-        self._files = MotionFiles(continuum, self.bodies)
+        self._checkpoints = MotionCheckpoints(
+            continuum, self.bodies, self.fronts, self._moving, self._present, self.stability
+        )
+        self._fields = MotionFields(
+            continuum, self.bodies, self.points, self.lumped, self.dynamics, self.prescribed
+        )
         zero = np.zeros(self.lumped.n_rows * continuum.gdim)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
 
@@ -222,6 +229,11 @@ class ExplicitSolver:
     def follow_bodies(self) -> None:
         """Take front geometry, contact normals and pairs of bodies that move far; collective."""
         self._moving.follow()
+
+    def follow_curved(self) -> None:
+        """Take normals and gaps of curved rigid surfaces, in every increment; collective."""
+        if self._moving.curved:
+            self._moving.follow_curved()
 
     def renew_stable_increment(self) -> float:
         """The stable increment with the present tangent, by a few more steps; collective."""
@@ -324,8 +336,9 @@ class ExplicitSolver:
         v = self.velocity if whole else self._velocity
         before = v.copy() if whole else v
         old = prescribed.motion(v, dynamics.v)
+        elastic = None
         if dynamics.elastic.exist and dt != self.last_dt:
-            self._interface_before, self._jumps_before = dynamics.v.copy(), dynamics.gap
+            elastic = dynamics.v.copy(), dynamics.gap
         outer.damp(v, h)
         outer.push(v, h)
         self.motion.change_first(v)
@@ -341,7 +354,9 @@ class ExplicitSolver:
             power += outer.power(before, v, h)
         self.energies.work += 0.5 * h * power
         if dt != self.last_dt:
-            self._take_change(v - before)
+            self._accounts.take_change(
+                dt - self.last_dt, self._internal, v - before, elastic, first=not self.increments
+            )
         self._velocity_whole = whole
         outer.end()
         add_multiple(u, dt, v)
@@ -353,23 +368,6 @@ class ExplicitSolver:
         self.increments += 1
         self._present.forget()
         self.seconds["update"] += clock.perf_counter() - start
-
-    def _take_change(self, more: Array) -> None:
-        """Account for a change of the increment, with which the middle of increments moves.
-
-        U of linear bodies is u^n . f_int(u^{n+1})/2, that of elastic bonds likewise; the work of
-        f_int in the increment is the change of U less (dt - last dt)/4 f_int . more.
-
-        Args:
-            more: Change of the velocity, owned dofs, shape (n_local,), length/time.
-        """
-        change, dynamics = 0.25 * (self.dt - self.last_dt), self.dynamics
-        gone = sums_over_ranks(self.comm, change * float(self._internal @ more))[0]
-        if dynamics.elastic.exist:
-            pull = dynamics.elastic.forces(self._jumps_before)
-            jumps = self.lumped.jumps(dynamics.v - self._interface_before)
-            gone -= change * float(np.vdot(pull, jumps))
-        self.energies.take_change(gone, first=not self.increments)
 
     def reactions(self) -> Array:
         """Reactions of the prescribed dofs of this rank, in the order of :attr:`prescribed`.
@@ -448,18 +446,10 @@ class ExplicitSolver:
     def collect(self) -> Arrays:
         """The state at the start of this increment as plain arrays; collective.
 
-        Returns:
-            displacement, velocity and positions of all nodes in the order of the input, on rank 0;
-            bonds and energies of the interfaces by row; bonded[p], shape (n_nodes,), and jump[p],
-            shape (n_nodes, gdim), per pair; loads, shape (n_loads,).
+        See :class:`fxcrack.solvers.explicit_checkpoints.MotionCheckpoints`.
         """
         self.record_state()
-        out = self._files.arrays(self.remember()) | {"loads": self.state.loads}
-        if self.bodies.finite:
-            out |= self._moving.arrays() | {"stable": np.array([self.stable])}
-            out["highest"] = self._files.gather(self.stability.highest)
-            out["looked"] = self._files.gather(self.stability.looked)
-        return out | self._present.arrays(self.fronts, self.state.jump)
+        return self._checkpoints.arrays(self.remember(), self.state, self.stable)
 
     def resume(self, arrays: Arrays, time: float) -> None:
         """Take a state that :meth:`collect` gave; collective.
@@ -471,18 +461,7 @@ class ExplicitSolver:
         Raises:
             InputError: The arrays do not fit the mesh.
         """
-        self._files.check_positions(arrays["positions"])
-        for p, front in enumerate(self.fronts):
-            gone = front.bonded & ~arrays[f"bonded[{p}]"].astype(bool)
-            if gone.any():
-                front.release(np.flatnonzero(gone))
-        if "highest" in arrays:
-            self._moving.restore(arrays)
-            scatter = self._files.scatter
-            self.stability.restore(
-                scatter(arrays["highest"]), float(arrays["stable"][0]), scatter(arrays["looked"])
-            )
-        self.recall(self._files.snapshot(arrays))
+        self.recall(self._checkpoints.resumed(arrays))
 
     # -- what criteria and output ask ----------------------------------------------------
 
@@ -491,19 +470,12 @@ class ExplicitSolver:
         assert self._now is not None
         columns = len(self.supports.columns)
         u = self.bodies.u.x.array[: self.continuum.n_local]
-        reactions = self._reactions_by_column(columns)
+        reactions = self._fields.reactions_by_column(self.reactions(), columns)
         conjugate = [*reactions.tolist(), *self._patterns.conjugates(u)]
         sums = sums_over_ranks(self.comm, *conjugate, *self._patterns.monitored(u))
         self.monitored = sums[len(conjugate) :]
         force, jumps = self._present.in_frames()
         self.state = Equilibrium(self._now, force, jumps, np.array(sums[: len(conjugate)]))
-
-    def _reactions_by_column(self, n_columns: int) -> Array:
-        """Reactions by support column, shape (n_columns,), of this rank."""
-        found = self.reactions()
-        if not self.points.exist:
-            return self.prescribed.by_column(found, n_columns)
-        return self.points.reactions(self.prescribed.on_unknowns(found, self.lumped), n_columns)
 
     def about(self) -> dict[str, Any]:
         """What is worth keeping with a history, plain types."""
@@ -549,18 +521,11 @@ class ExplicitSolver:
 
     def displacements_of(self, where: list[Ints]) -> Array:
         """Mean displacements of sets of owned nodes, shape (n_sets, gdim); collective."""
-        u = self.continuum.layout.displacements(self.points.nodal(self._owned))
-        sums = [[*u[nodes].sum(axis=0), len(nodes)] for nodes in where]
-        flat = np.array(sums_over_ranks(self.comm, *np.ravel(sums))).reshape(len(where), -1)
-        return np.asarray(flat[:, :-1] / flat[:, -1:])
+        return self._fields.means(where)
 
     def displacement(self, state: Equilibrium | None = None) -> PETSc.Vec:
         """Present displacement; collective; the caller destroys it."""
-        vector = PETSc.Vec().createMPI(
-            (self.continuum.n_local, self.continuum.n_global), comm=self.comm
-        )
-        vector.array[:] = self.points.nodal(self.bodies.u.x.array[: self.continuum.n_local])
-        return vector
+        return self._fields.displacement()
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies; the caller destroys them.
@@ -568,18 +533,8 @@ class ExplicitSolver:
         They are what the acceleration needs beyond internal forces and loads, M a - f. Collective,
         between :meth:`begin` and :meth:`finish`, of the present state alone.
         """
-        vector = u.duplicate()
-        vector.set(0.0)
-        n, prescribed = self.continuum.n_local, self.prescribed
-        values = np.zeros(n)
-        values[prescribed.dofs] = self.reactions()[: len(prescribed.dofs)]
-        if len(self._at_interface):
-            mine, lumped = self._mine, self.lumped
-            forces = self._at_nodes.reshape(-1, self.continuum.gdim)
-            held = lumped.mass[mine, None] * self.dynamics.a[mine] - forces[mine]
-            values[self._at_interface] = held.ravel()
-        vector.array[:] = self.points.nodal_forces(values)
-        return vector
+        forces = self._at_nodes.reshape(-1, self.continuum.gdim)
+        return self._fields.forces(self._at_interface, forces, self.reactions())
 
     def destroy(self) -> None:
         """Nothing is kept that must be freed collectively."""

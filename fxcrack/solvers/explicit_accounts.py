@@ -70,6 +70,33 @@ class EnergyAccounts:
         answers = sums_over_ranks(comm, *self._loads.conjugates(u))
         return self._loads.thermal_part(factors, np.array(answers))
 
+    def take_change(
+        self, longer: float, internal: Array, more: Array, elastic: tuple[Array, Array] | None,
+        *, first: bool,
+    ) -> None:  # fmt: skip
+        """Account for a change of the increment, with which the middle of increments moves.
+
+        U of linear bodies is u^n . f_int(u^{n+1})/2, that of elastic bonds likewise; the work of
+        f_int in the increment is the change of U less (dt - last dt)/4 f_int . more. Collective.
+
+        Args:
+            longer: The increment less the last one, time.
+            internal: Internal forces at its start, owned dofs, shape (n_local,).
+            more: Change of the velocity, same shape, length/time.
+            elastic: Where bonds have a stiffness, velocity of the interface nodes before the
+                increment and jumps of the open rows at its start.
+            first: Whether it is the first increment of all.
+        """
+        change, dynamics = 0.25 * longer, self._dynamics
+        comm = self._bodies.continuum.comm
+        gone = sums_over_ranks(comm, change * float(internal @ more))[0]
+        if elastic is not None:
+            before, gap = elastic
+            pull = dynamics.elastic.forces(gap)
+            jumps = dynamics.lumped.jumps(dynamics.v - before)
+            gone -= change * float(np.vdot(pull, jumps))
+        self._sums.take_change(gone, first=first)
+
     def spent(self) -> dict[str, float]:
         """Energies that have left the bodies, by name; collective."""
         gone, sums = self._dynamics.energies, self._sums

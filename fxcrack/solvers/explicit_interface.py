@@ -27,6 +27,7 @@ from fxcrack.base.sparse import Product
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.front import Front
 from fxcrack.interface.lumped import LumpedInterface
+from fxcrack.interface.lumped_rows import bonds_of, jumps_along, mean_jumps
 from fxcrack.interface.pair import Pair
 from fxcrack.solvers.explicit_acting import ActingForces, InterfaceEnergies
 from fxcrack.solvers.explicit_bonds import Fading, SofteningBonds, older
@@ -232,7 +233,7 @@ class InterfaceDynamics:
         bonds.low[rows] = bonds.top[rows] = 0.0
         if np.any(self.elastic.local[rows]):
             motion = self.u - (self._h - 0.5 * self._dt) * self.v
-            at = self.lumped.jumps_along(rows, bonds.direction[rows])(motion.ravel())
+            at = jumps_along(self.lumped, rows, bonds.direction[rows])(motion.ravel())
             bonds.origin[rows] = at
         bonds.active[rows] = True
         self._soften()
@@ -331,9 +332,9 @@ class InterfaceDynamics:
     def chosen_bonds(self, rows: Ints) -> ChosenBonds:
         """Prepare :meth:`bonds_at` for some tied rows, shape (n,)."""
         if np.any(self.elastic.active[rows]):
-            jumps = self.lumped.mean_jumps(rows[:, None], np.ones((len(rows), 1)))
+            jumps = mean_jumps(self.lumped, rows[:, None], np.ones((len(rows), 1)))
             return ChosenBonds(jumps, None, self.elastic.stiffness_of(rows))
-        return ChosenBonds(*self.lumped.bonds_of(rows, self._fixed))
+        return ChosenBonds(*bonds_of(self.lumped, rows, self._fixed))
 
     def bonds_at(self, chosen: ChosenBonds) -> Array:
         """Bond forces on the slaves of chosen rows, shape (n gdim,), force."""

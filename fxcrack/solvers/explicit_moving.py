@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from fxcrack.base.arrays import Bools
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
 from fxcrack.interface.finite_sliding import changing, renewed, with_changing
 from fxcrack.interface.front import Front
+from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.pairing import local_frames
+from fxcrack.interface.rigid import RIGID, RigidSurface
+from fxcrack.interface.rigid_pairing import renewed_on
 from fxcrack.interface.surface import FacetSurface, gather_surface
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 
@@ -24,7 +27,7 @@ _TURNED = 0.2
 
 def sliding_masters(
     continuum: Continuum, pairs: Sequence[Pair], *, finite: bool
-) -> list[FacetSurface | None]:
+) -> list[FacetSurface | RigidSurface | None]:
     """Undeformed master surfaces of the pairs whose open nodes are paired anew; collective.
 
     Args:
@@ -35,15 +38,31 @@ def sliding_masters(
     Returns:
         ``None`` for pairs that stay as they are.
     """
-    out: list[FacetSurface | None] = []
+    out: list[FacetSurface | RigidSurface | None] = []
     for pair in pairs:
         master = pair.sides[1]
-        # a rigid surface has no nodes
-        if finite and pair.interface.contact and isinstance(master, str | Face):
+        if not finite or not pair.interface.contact:
+            out.append(None)
+        elif isinstance(master, str | Face):
             out.append(gather_surface(continuum, master))
         else:
-            out.append(None)
+            out.append(pair.rigid)
     return out
+
+
+def _overlap(pair: Pair) -> Array:
+    """By how much nodes overlap a rigid surface at the start where gaps are zero, (n_nodes,)."""
+    if pair.rigid is None:
+        return np.zeros(len(pair.gap))
+    distance, _ = pair.rigid.measure(pair.surface.x)
+    return np.where(pair.paired, np.maximum(pair.gap - distance, 0.0), 0.0)
+
+
+def _nodes_of(lumped: LumpedInterface, master: FacetSurface | RigidSurface) -> Ints:
+    """Interface nodes of a master surface, shape (n,); a rigid one has none."""
+    if isinstance(master, FacetSurface):
+        return lumped.nodes.find(master.dofs)
+    return np.zeros(0, dtype=np.int64)
 
 
 class MovingInterfaces:
@@ -58,7 +77,7 @@ class MovingInterfaces:
 
     def __init__(
         self, dynamics: InterfaceDynamics, pairs: list[Pair], fronts: Sequence[Front],
-        masters: Sequence[FacetSurface | None],
+        masters: Sequence[FacetSurface | RigidSurface | None],
     ) -> None:  # fmt: skip
         self._dynamics, self._pairs, self._fronts = dynamics, pairs, fronts
         self._masters, lumped = masters, dynamics.lumped
@@ -66,9 +85,23 @@ class MovingInterfaces:
         self._nodes = [
             None
             if master is None
-            else (lumped.nodes.find(pair.surface.dofs), lumped.nodes.find(master.dofs))
+            else (lumped.nodes.find(pair.surface.dofs), _nodes_of(lumped, master))
             for pair, master in zip(pairs, masters, strict=True)
         ]
+        # faces that a gap of zero lets overlap a rigid surface at the start are not pushed out
+        self._overlap = [_overlap(pair) for pair in pairs]
+        # the normal of a curved surface turns with every increment, and a node that moved along
+        # the tangent for some of them would be pushed back by several times its way in one
+        self.curved = [p for p, m in enumerate(masters) if isinstance(m, RIGID) and not m.flat]
+
+    def follow_curved(self) -> None:
+        """Take normals and gaps of curved rigid surfaces from the present displacement."""
+        if any([self._renew_on_rigid(p, turned=0.0) for p in self.curved]):
+            self._dynamics.lumped.set_pairing(self._pairs)
+            self._dynamics.set_ties(self._dynamics.lumped.tied)
+            return
+        self._dynamics.lumped.version += 1
+        self._dynamics.set_frames()
 
     def follow(self) -> None:
         """Take front geometry, contact normals and pairs from the present displacement."""
@@ -84,7 +117,9 @@ class MovingInterfaces:
             if self._masters[p] is not None:
                 # open pairs keep the normal that their gap was found with
                 turn = has & (self._held(p) | ~self._pairs[p].paired)
-                changed |= self._pair_anew(p)
+                rigid = isinstance(self._masters[p], RIGID)
+                changed |= self._renew_on_rigid(p) if rigid else self._pair_anew(p)
+            turn &= ~lumped.rigid[rows]  # their normals are those of the rigid surface
             lumped.frames[rows[turn]] = frames[turn]
         if changed:
             lumped.set_pairing(self._pairs)
@@ -120,6 +155,21 @@ class MovingInterfaces:
         # faces that overlap by the change of their facets alone are not pushed apart at once
         lumped.gap[at] = new.gap[loose] - np.minimum(gap, 0.0)
         return True
+
+    def _renew_on_rigid(self, p: int, **options: float) -> bool:
+        """Take normals and gaps on a rigid surface; whether other nodes are paired now."""
+        lumped, nodes, pair = self._dynamics.lumped, self._nodes[p], self._pairs[p]
+        assert nodes is not None
+        held = self._held(p)
+        new = renewed_on(pair, held, self._dynamics.u[nodes[0]], **options)
+        if new is None:
+            return False
+        self._pairs[p] = new
+        rows = lumped.row_of[p]
+        loose = (rows >= 0) & ~held & new.paired
+        lumped.frames[rows[loose]] = new.frames[loose]
+        lumped.gap[rows[loose]] = new.gap[loose] + self._overlap[p][loose]
+        return not np.array_equal(new.paired, pair.paired)
 
     # -- checkpoints ---------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ import numpy as np
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.lumped import LumpedInterface
+from fxcrack.interface.lumped_rows import jumps_along
 from fxcrack.interface.pair import Pair
 from fxcrack.solvers.explicit_acting import ActingForces
 from fxcrack.solvers.explicit_bonds import Fading
@@ -90,13 +91,13 @@ class OpenPairs:
         may_touch = self._touches[rows] & (self._compliance > 1e-12 * scale)
         may_touch &= ~springs[rows] & lumped.paired[rows]
         self._may_touch = np.flatnonzero(may_touch)
-        self._closing = lumped.jumps_along(rows[self._may_touch], self._normal[self._may_touch])
+        self._closing = jumps_along(lumped, rows[self._may_touch], self._normal[self._may_touch])
         self._has_gap = bool(np.any(lumped.gap[rows]))
         self._closing_gap = lumped.gap[rows[self._may_touch]]
         self._gaps = np.zeros(len(self._may_touch))
         self._faces = OpenFaces(
             self._normal, lumped.gap[rows] if self._has_gap else None, self._may_touch,
-            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.simple,
+            self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.separate,
         )  # fmt: skip
         self._last_found: FaceForces | None = None
 

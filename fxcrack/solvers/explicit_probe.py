@@ -90,7 +90,7 @@ class ExplicitFrontProbe:
 
     def jumps(self, nodes: Ints, state: Any) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""
-        return self._vectors(nodes, self._values.jumps)
+        return self.pair.interface.opening_factor * self._vectors(nodes, self._values.jumps)
 
     @property
     def bodies(self) -> Any:

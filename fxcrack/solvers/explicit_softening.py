@@ -7,6 +7,7 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.equilibrium.discrete_gradient import force_of_one, softening_force
 from fxcrack.interface.lumped import LumpedInterface
+from fxcrack.interface.lumped_rows import jumps_along, pull_along
 from fxcrack.solvers.explicit_bonds import SofteningBonds
 
 SWEEPS = 200
@@ -42,9 +43,9 @@ class LiveBonds:
         self._bonds = bonds
         self.rows = k = np.flatnonzero(bonds.active & ~lumped.tied)
         self.direction = bonds.direction[k]
-        self.along = lumped.jumps_along(k, self.direction)
-        self.push, self.coupling = lumped.pull_along(k, self.direction)
-        self.coupled = not lumped.simple
+        self.along = jumps_along(lumped, k, self.direction)
+        self.push, self.coupling = pull_along(lumped, k, self.direction)
+        self.coupled = not lumped.separate
         self._strength, self._final = bonds.strength[k], bonds.final[k]
         self.origin = bonds.origin[k]
         self._numbers = list(zip(self._strength.tolist(), self._final.tolist(), strict=True))

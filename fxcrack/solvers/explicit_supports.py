@@ -70,7 +70,8 @@ class PrescribedMotion:
             return np.zeros(0)
         needed = lumped.group_mass[node] * dynamics.a[self._nodes]
         follows = np.zeros(len(lumped.nodes), dtype=bool)
-        follows[lumped.slave[lumped.tied]] = True
+        # on a rigid surface no master shows the reaction instead
+        follows[lumped.slave[lumped.tied & ~lumped.rigid]] = True
         return np.where(follows[node], 0.0, needed - dynamics.total[self._nodes])
 
     def by_column(self, reactions: Array, n_columns: int) -> Array:

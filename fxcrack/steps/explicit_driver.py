@@ -105,6 +105,8 @@ class ExplicitDriver:
             then = analysis.loads_at(increments.time(n + 1))
             if self._follows and n % FOLLOW == 0:
                 solver.follow_bodies()
+            elif self._follows:
+                solver.follow_curved()
             solver.begin(now, then)
             released = self._release()
             if not resumed:

@@ -19,6 +19,7 @@ from fxcrack.criteria.crack_closure import closure_weights
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues
 from fxcrack.criteria.mixed_mode import least_critical
+from fxcrack.interface.lumped_rows import mean_jumps
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.explicit_bonds import Fading
@@ -77,7 +78,10 @@ class ReleaseControl:
             if len(tips):
                 crack.check_wake(tips)
             row_of = self._solver.row_of[crack.p]
-            behind = lumped.mean_jumps(row_of[tips.wake_nodes[:, 0]], tips.wake_weights[:, 0])
+            # on a plane of symmetry rates are those of the whole crack
+            factor = crack.probe.pair.interface.opening_factor
+            rows = row_of[tips.wake_nodes[:, 0]]
+            behind = mean_jumps(lumped, rows, factor * tips.wake_weights[:, 0])
             self._screen = _Screen(
                 tips, self._solver.dynamics.chosen_bonds(row_of[tips.node]),
                 behind, self._bounds(tips), version,

@@ -179,16 +179,10 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 "release=StepRelease(), or use viscosity=0: a progressive release needs none"
             )
     for interface in (*[d.interface for d in debonds], *bonds):
-        if interface.is_rigid:
+        if interface.normal_only and not interface.is_rigid:
             raise InputError(
-                f"interface '{interface.title}': explicit dynamics has no rigid surfaces; hold the "
-                "nodes by Displacement where they stay bonded, model the other body, or use a "
-                "Dynamic step"
-            )
-        if interface.normal_only:
-            raise InputError(
-                f"interface '{interface.title}': bonds of explicit dynamics hold in all "
-                "directions; leave normal_only out"
+                f"interface '{interface.title}': bonds between bodies of explicit dynamics hold in "
+                "all directions; leave normal_only out"
             )
         if interface.stiffness == "arms":
             raise InputError(

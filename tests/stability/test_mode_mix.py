@@ -109,7 +109,7 @@ def test_through_no_load_at_all(law: str, stepping: str) -> None:
     assert at_one - 1e-6 <= onset["time"] <= 2.0 + np.sqrt(1.2) + 1e-6
 
 
-@pytest.mark.quick("BK-heights0")
+@pytest.mark.slow
 @pytest.mark.parametrize("heights", [(0.3, 3.0), (3.0, 0.3)])
 @pytest.mark.parametrize("law", LAWS)
 def test_products_of_the_wrong_sign(law: str, heights: tuple[float, float]) -> None:

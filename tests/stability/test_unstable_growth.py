@@ -149,7 +149,7 @@ def strain_energy(a: float, u: float) -> float:
     return float(history.rows[-1]["strain_energy"])
 
 
-@pytest.mark.quick("0.5")
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.35, 0.5])
 def test_flexure_jumps_and_arrests(share: float) -> None:
     """Shorter than 0.69 of the half span it jumps at a fixed deflection, beyond it does not."""
