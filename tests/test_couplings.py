@@ -361,13 +361,3 @@ def test_large_rotations_are_said(caplog: pytest.LogCaptureFixture) -> None:
     if MPI.COMM_WORLD.rank == 0:
         assert "Coupling('block') has turned by 0.2 radians" in caplog.text
     scene.close()
-
-
-def test_not_in_explicit_dynamics() -> None:
-    scene = fx.Scene(
-        bar(order=1), materials=fx.Isotropic(E, 0.0, density=1e-3), model=fx.PlaneStress(),
-        supports=[fx.Coupling("left", (0.0, 0.0), x=0.0, y=0.0)], effects=[fx.Inertia()],
-    )  # fmt: skip
-    with pytest.raises(fx.InputError, match="couplings and equations"):
-        scene.run(fx.Explicit(until=fx.Time(1e-3)), progress=False)
-    scene.close()

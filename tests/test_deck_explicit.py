@@ -46,7 +46,7 @@ ALLSE
 DECK = BARS + GLUE + EXPLICIT
 
 
-def same_in_python(deck: fx.Scene) -> fx.Scene:
+def same_in_python(deck: fx.Scene, *, upper: fx.Coupling | None = None) -> fx.Scene:
     """The scene of the deck by hand, on its mesh."""
     bond = fx.Interface(
         "TOP", "BOTTOM", bonded=lambda x: x[0] > 0.5, contact=True, friction=0.1, name="TOP"
@@ -57,7 +57,7 @@ def same_in_python(deck: fx.Scene) -> fx.Scene:
         materials=fx.Isotropic(1000.0, 0.3, density=1.0),
         model=fx.PlaneStrain(),
         supports=[
-            fx.Displacement("11", x=0.0, y=0.1, amplitude=moves),
+            upper or fx.Displacement("11", x=0.0, y=0.1, amplitude=moves),
             fx.Displacement("21", x=0.0, y=-0.1, amplitude=moves),
         ],
         debonds=[fx.Debond(bond, fx.VCCT(0.5, 1.0, mix=fx.BK(2.0)))],
@@ -79,6 +79,26 @@ def test_a_deck_and_the_scene_in_python_give_the_same_history(tmp_path):
         assert found[column] == pytest.approx(wanted[column], rel=1e-10, abs=1e-10 * size)
     said = "\n".join(deck.report.replaced)
     assert "the stiffness of the bonds is left out" in said and "released progressively" in said
+
+
+def test_kinematic_couplings_in_explicit_decks(tmp_path):
+    """The end of one arm turns with a reference that is moved along y: a Coupling in Python."""
+    sets = "*NODE\n99, -0.5, 1.5\n*NSET, NSET=HEAD\n1, 11\n"
+    couple = "*SURFACE, TYPE=NODE, NAME=GRIPS\nHEAD,\n*COUPLING, CONSTRAINT NAME=C, REF NODE=99, "
+    couple += "SURFACE=GRIPS\n*KINEMATIC\n"
+    moved = EXPLICIT.replace("11, 1, 1\n11, 2, 2, 0.1", "99, 1, 1\n99, 2, 2, 0.1")
+    deck = fx.read_deck(write(tmp_path, BARS + GLUE + sets + couple + moved))
+    found = deck.run()
+    moves = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 0.5, 2.0))
+    grip = fx.Coupling("HEAD", (-0.5, 1.5), x=0.0, y=0.1, amplitude=moves, name="grip")
+    by_hand = same_in_python(deck.scene, upper=grip)
+    wanted = by_hand.run(fx.Explicit(until=fx.Time(2.0), rows=20, bulk=(0.06, 1.2)))
+    assert found.rows[-1]["released[TOP]"] == wanted.rows[-1]["released[TOP]"] > 0
+    reaction = wanted["R[grip.y]"].astype(float)
+    (column,) = (
+        c for c in found.columns if c.startswith("R[") and c.endswith("y]") and "21" not in c
+    )
+    assert found[column] == pytest.approx(reaction, rel=1e-10, abs=1e-10 * np.abs(reaction).max())
 
 
 def test_controls_of_the_step(tmp_path):

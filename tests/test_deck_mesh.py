@@ -51,7 +51,7 @@ def test_replaced_and_refused_element_types():
     for name, words in {
         "STRI65": "triangles", "SC6R": "prisms", "C3D6": "prisms", "COH3D8": "cohesive",
         "B31": "beams", "U1": "user elements", "CPE4RT": "temperatures", "CPEG4": "generalised",
-        "C3D7": "not known", "R3D4": "rigid",
+        "C3D7": "not known", "RB3D2": "rigid",
     }.items():  # fmt: skip
         assert words in element_type(name)
 
@@ -82,7 +82,7 @@ def test_refused_elements_name_file_line_and_remedy(tmp_path):
             "*ELEMENT, TYPE=CPS4\n9, 1, 2, 5, 4\n*NSET, NSET=LEFT",
             "one of the kinematic models",
         ),
-        ("*NODE, NSET=ALL", "*NODE, NSET=ALL, SYSTEM=S", "SYSTEM=S is not available"),
+        ("*NODE, NSET=ALL", "*NODE, NSET=ALL, SYSTEM=T", "SYSTEM=T is not available"),
         ("STEEL\n2.0", "STEEL\n-2.0", "the thickness -2 must be positive"),
         ("LAST, S2", "LAST, S5", "has faces 1 to 4, not 5"),
         ("LAST, S2", "LAST, S4", "lies inside; only"),

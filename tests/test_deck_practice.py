@@ -238,12 +238,6 @@ def test_the_former_kinematic_coupling(tmp_path):
     assert one.prescribed == {"x": 0.0, "y": 0.2} and one.point == (0.0, 3.0)
 
 
-def test_analytical_rigid_surfaces_are_named(tmp_path):
-    text = BONDED + "*RIGID BODY, ANALYTICAL SURFACE=TOP, REF NODE=1\n"
-    with pytest.raises(DeckError, match="analytical rigid surfaces are not available"):
-        read(tmp_path, text + OPENED.format(criterion=VCCT))
-
-
 # -- numbers ---------------------------------------------------------------------------------------
 
 

@@ -235,3 +235,7 @@ def test_refusals(comm: MPI.Intracomm) -> None:
     scene = fx.Scene(sheets(frame, comm, joined=True), supports=[fx.Clamp("flat_a1")], **given)
     with pytest.raises(fx.InputError, match="kinks or T joints"):
         explicit(scene)
+    plate = sheets([Sheet("flat", x, [0.0, 2.0])], comm)
+    scene = fx.Scene(plate, supports=[fx.Coupling("flat_a1", (8.0, 0.0, 0.0))], **given)
+    with pytest.raises(fx.InputError, match="couplings and equations"):
+        explicit(scene)

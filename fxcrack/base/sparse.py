@@ -104,6 +104,14 @@ class Product:
         """A x as a new array of shape (n,)."""
         return self.into(x, np.empty(self.shape[0]))
 
+    def rows(self, at: Ints) -> sp.csr_matrix:
+        """Some rows of A, shape (len(at), m)."""
+        return sp.csr_matrix(self.matrix()[at])
+
+    def times(self, columns: sp.csr_matrix) -> sp.csr_matrix:
+        """A times a sparse matrix of shape (m, k)."""
+        return sp.csr_matrix(self.matrix() @ columns)
+
     def matrix(self) -> sp.csr_matrix:
         """A, sharing its entries."""
         return sp.csr_matrix((self.data, self._columns, self._starts), shape=self.shape)

@@ -28,7 +28,9 @@ from fxcrack.deck.equations import DeckEquation, Dummy, equation_supports, read_
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.rigid import RigidSet, rigid_supports
+from fxcrack.deck.rigid_elements import rigid_labels
 from fxcrack.deck.supports import AnySupport, Boundary
+from fxcrack.deck.transforms import Transforms
 
 
 class Carrier(Protocol):
@@ -70,6 +72,20 @@ class Constraints:
         """What carries the loads of reference nodes, by node."""
         sets = {one.reference: one for one in reversed(self.rigid)}
         return {**self.dummies, **self.distributed, **sets}
+
+    def check_axes(self, transforms: Transforms) -> None:
+        """Refuse equations between components along axes of their own.
+
+        Raises:
+            DeckError: One has such a node.
+        """
+        for equation in self.equations:
+            for nodes, _, _ in equation.terms:
+                if transforms.turned[nodes].any():
+                    equation.card.fail(
+                        f"the equation of '{equation.name}' has nodes with a *TRANSFORM; write it "
+                        "between components along the global axes"
+                    )
 
     def supports(self, boundary: Boundary, groups: Groups) -> list[AnySupport]:
         """The constraints in the words of a scene; to be called before those of the boundary.
@@ -117,7 +133,9 @@ def read_constraints(cards: Sequence[Card], flat: Flat) -> Constraints:
         elif card.keyword == "KINEMATICCOUPLING":
             rigid += _kinematic_by_nodes(card, flat)
         elif card.keyword == "RIGIDBODY":
-            rigid.append(_rigid_body(card, flat))
+            body = _rigid_body(card, flat)
+            if body is not None:
+                rigid.append(body)
     if coupling is not None:
         coupling.fail("*KINEMATIC or *DISTRIBUTING must follow")
     dummies: dict[int, Dummy] = {}
@@ -188,18 +206,17 @@ def _kinematic_by_nodes(card: Card, flat: Flat) -> list[RigidSet]:
     ]
 
 
-def _rigid_body(card: Card, flat: Flat) -> RigidSet:
-    if card.has("ANALYTICAL SURFACE"):
-        card.fail(
-            "analytical rigid surfaces are not available; mesh a stiff body with the surface, or, "
-            "on a plane of symmetry, model the other half"
-        )
+def _rigid_body(card: Card, flat: Flat) -> RigidSet | None:
+    """Nodes that follow a reference; ``None`` for rigid surfaces alone."""
     names = [n for n in ("TIE NSET", "PIN NSET", "NSET", "ELSET") if card.has(n)]
     parts = [flat.nodes(card, card.text(name)) for name in names if name != "ELSET"]
-    if card.has("ELSET"):
+    of_rigid = card.has("ELSET") and rigid_labels(flat, card.home, card, card.text("ELSET"))
+    if card.has("ELSET") and not of_rigid:
         parts.append(np.unique(flat.cells[flat.elements(card, card.text("ELSET"))]))
     if not parts:
-        card.fail("give ELSET, TIE NSET or PIN NSET; rigid surfaces are not available")
+        if not of_rigid and not card.has("ANALYTICAL SURFACE"):
+            card.fail("give ELSET, TIE NSET, PIN NSET or ANALYTICAL SURFACE")
+        return None
     nodes = flat.with_centres(np.unique(np.concatenate(parts)))
     title = _titled(card, card.text(names[0]))
     dofs = set(range(3 if names == ["PIN NSET"] else 6))

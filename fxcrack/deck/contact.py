@@ -8,8 +8,9 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Ints
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
+from fxcrack.continuum.face import Face
 from fxcrack.criteria import (
     Criterion,
     RampRelease,
@@ -24,15 +25,20 @@ from fxcrack.deck.groups import Groups
 from fxcrack.deck.interactions import friction, interaction, note_thickness
 from fxcrack.deck.joined_pairs import join_pairs, joined_criterion
 from fxcrack.deck.model import Family
-from fxcrack.deck.pair_def import PairDef, slave_nodes
+from fxcrack.deck.pair_def import PairDef, bonded_nodes, slave_nodes
 from fxcrack.deck.release import check_alike, read_release
 from fxcrack.deck.report import Report
+from fxcrack.deck.rigid_surfaces import RigidSurfaces, Surface
 from fxcrack.deck.supports import Boundary
+from fxcrack.deck.ties import pairing_of, tie
 from fxcrack.interface.definition import Interface
+from fxcrack.interface.rigid import RIGID
 from fxcrack.steps.debond import Debond
 
 _RAMP = 5
 """Increments over which a ramp falls that cannot fall with the opening."""
+_BEYOND = 1.001
+"""Search tolerance of rigid masters over the largest distance of a slave node."""
 _COINCIDENT = 1e-6
 """Distance of nodes at one place, over the size of the facets."""
 
@@ -68,6 +74,7 @@ class Contacts:
         self._flat, self._groups, self._report, self._finite = flat, groups, report, finite
         self._explicit = explicit
         self.pairs: list[PairDef] = []
+        self._rigid = RigidSurfaces(cards, flat)
         self._clearances = [card for card in cards if card.keyword == "CLEARANCE"]
         for card in cards:
             if card.keyword == "CONTACTPAIR":
@@ -134,6 +141,12 @@ class Contacts:
                     "bonded; add SMALL SLIDING"
                 )
             pair.bonded, pair.normal_only = row, normal_only
+
+    @property
+    def bonds_bodies(self) -> bool:
+        """Whether an interface is bonded, in part at least."""
+        pairs = any(p.bonded is not None or p.row.card.has("TIED") for p in self.pairs)
+        return pairs or bool(self._ties or self._general.slave_nodes)
 
     def slave_nodes(self) -> dict[str, Ints]:
         """Nodes of the slave surfaces by the titles of the interfaces."""
@@ -209,6 +222,8 @@ class Contacts:
             card = pair.row.card
             if pair.bonded is None and not card.has("TIED"):
                 continue
+            if self._rigid.has(pair.row):
+                continue
             slave = slave_nodes(pair, self._flat)
             name = "" if pair.bonded is None else label(pair.bonded.text(2))
             if name and pair.bonded is not None:
@@ -217,7 +232,7 @@ class Contacts:
             self._share(boundary, card, pair.title, slave, (pair.master, pair.row.index))
         for card in self._ties:
             for row in card.rows():
-                slave = np.unique(self._flat.surface(card, row.text(0), row.index))
+                slave = np.unique(self._flat.surface(card, row.text(0), row.index, whole=False))
                 self._share(boundary, card, row.text(0), slave, (row.text(1), row.index))
 
     def _share(
@@ -226,7 +241,7 @@ class Contacts:
         held = slave[(boundary.owner[:, :, slave] >= 0).any(axis=(0, 1))]
         if not len(held):
             return
-        rows = self._flat.surface(card, *of_master)
+        rows = self._flat.surface(card, *of_master, whole=not self._ties)
         x = self._flat.points
         master = np.setdiff1d(np.unique(rows), slave)
         if not len(master):
@@ -245,20 +260,21 @@ class Contacts:
     # -- the scene -----------------------------------------------------------------------
 
     def build(
-        self, interactions: dict[str, Family], supported: Ints
+        self, interactions: dict[str, Family], supported: Ints, boundary: Boundary
     ) -> tuple[list[Debond], list[Interface]]:
         """Debonds and bonds of the scene.
 
         Args:
             interactions: Properties of contact by key.
             supported: Nodes that supports hold, ascending.
+            boundary: What is prescribed.
 
         Raises:
             DeckError: A property is not available, or contradicts another.
         """
         debonds, bonds = [], []
         for pair in self.pairs:
-            pair.interface = self._interface(pair, interactions)
+            pair.interface = self._interface(pair, interactions, boundary)
             if not pair.debonds:
                 bonds.append(pair.interface)
                 continue
@@ -274,7 +290,10 @@ class Contacts:
                 )
             self._check_wake(pair)
         for card in self._ties:
-            bonds += [self._tie(row) for row in card.need_rows("slave surface, master surface")]
+            bonds += [
+                tie(row, self._flat, self._groups, explicit=self._explicit)
+                for row in card.need_rows("slave surface, master surface")
+            ]
         more, others = self._general.build(interactions, self._nodal, finite=self._finite)
         return debonds + more, bonds + others
 
@@ -313,11 +332,22 @@ class Contacts:
                 pair.slave,
             )
 
-    def _interface(self, pair: PairDef, interactions: dict[str, Family]) -> Interface:
+    def _interface(
+        self, pair: PairDef, interactions: dict[str, Family], boundary: Boundary
+    ) -> Interface:
         card, flat, groups = pair.row.card, self._flat, self._groups
         index = pair.row.index
         slave = groups.surface(card, pair.slave, index)
-        master = groups.surface(card, pair.master, index)
+        master: str | Face | Surface
+        tolerance = None
+        if self._rigid.has(pair.row):
+            x = flat.points[slave_nodes(pair, flat)]
+            master = self._rigid.master(pair.row, x, boundary)
+            # all slave nodes may meet it, wherever they are at the start
+            tolerance = _BEYOND * max(float(np.abs(master.measure(x)[0]).max()), _least(x))
+            self._check_bonded(pair, master)
+        else:
+            master = groups.surface(card, pair.master, index)
         bonded: object = Everywhere(card.has("TIED"))
         if pair.bonded is not None:
             name = label(pair.bonded.text(2))
@@ -338,10 +368,23 @@ class Contacts:
             contact=not card.has("TIED"),
             friction=friction,
             normal_only=pair.normal_only,
-            pairing=_pairing(card),
+            pairing=pairing_of(card),
             gap=gap,
+            tolerance=tolerance,
             name=pair.title,
         )
+
+    def _check_bonded(self, pair: PairDef, master: Surface) -> None:
+        """Refuse bonded nodes away from a rigid master."""
+        nodes = bonded_nodes(pair, self._flat)
+        rows = self._flat.surface(pair.row.card, pair.slave, pair.row.index)
+        size = float(np.linalg.norm(np.ptp(self._flat.points[rows], axis=1), axis=1).mean())
+        off = np.abs(master.measure(self._flat.points[nodes])[0])
+        if pair.bonded is not None and off.max(initial=0.0) > 0.1 * size:
+            pair.bonded.fail(
+                f"{int((off > 0.1 * size).sum())} bonded nodes do not lie on the {master}, the "
+                f"farthest is {off.max():.3g} away; move it to them, or take them out of the set"
+            )
 
     def _clearance_of(self, pair: PairDef) -> bool:
         """Whether a clearance that is nothing beside the elements is given for a pair."""
@@ -389,7 +432,13 @@ class Contacts:
                 criterion_card,
             )
         if pair.normal_only and isinstance(criterion, RateCriterion):
-            criterion_card.fail("a bond in the NORMAL direction only is not possible with it")
+            if not isinstance(pair.interface.master, RIGID):
+                criterion_card.fail("a bond in the NORMAL direction only is not possible with it")
+            self._report.replace(
+                "the bond holds the opening only, as on a plane of symmetry; energy release rates "
+                "are those of the body that is modelled, of a half model half of the whole ones",
+                criterion_card,
+            )
         release = read_release(card, criterion)
         if rubs and isinstance(release, RampRelease):
             release = RampRelease(increments=_RAMP)
@@ -415,24 +464,7 @@ class Contacts:
             finite=self._finite,
         )
 
-    def _tie(self, row: Row) -> Interface:
-        card, groups = row.card, self._groups
-        slave, master = label(row.text(0)), label(row.text(1))
-        if not slave or not master or key(slave) == key(master):
-            row.fail("a tie needs two surfaces, slave and master")
-        card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "SURFACE TO SURFACE")
-        tolerance = card.number("POSITION TOLERANCE", 0.0) or None
-        return Interface(
-            groups.surface(card, slave, row.index),
-            groups.surface(card, master, row.index),
-            bonded=Everywhere(True),
-            tolerance=tolerance,
-            pairing=None if self._explicit else _pairing(card),
-            name=card.text("NAME", default=slave),
-        )
 
-
-def _pairing(card: Card) -> str | None:
-    """How nodes follow the master where the deck says so."""
-    kinds = {"NODETOSURFACE": "node-to-surface", "SURFACETOSURFACE": "surface-to-surface"}
-    return kinds[card.word("TYPE")] if card.has("TYPE") else None
+def _least(x: Array) -> float:
+    """A length that is small beside a surface: a search tolerance must not be 0."""
+    return 1e-6 * float(np.ptp(x, axis=0).max())

@@ -13,6 +13,7 @@ from fxcrack.base.checks import communicator, file_path
 from fxcrack.base.errors import FxcrackError, InputError
 from fxcrack.deck.cards import DeckError
 from fxcrack.deck.explicit import SAFETY
+from fxcrack.deck.left_out import without_unused
 from fxcrack.deck.model import read_model
 from fxcrack.deck.procedures import DeckStep
 from fxcrack.deck.reader import read_cards
@@ -159,7 +160,7 @@ def _made(found: Translated | None, path: Path, comm: MPI.Intracomm, *, say: boo
     except InputError as error:
         raise DeckError(f"{path.name}: {error}") from error
     finally:  # after the scene is made, whose report holds the warnings since then
-        for line in report.replaced if say else ():
+        for line in [*report.replaced, *report.doubts] if say else ():
             log.warn("%s", line)
     return Deck(scene, steps, report, nodes)
 
@@ -172,7 +173,7 @@ def translated(path: Path, order: int | None = None) -> Translated:
 
 def _translated(path: Path, report: Report, order: int | None = None) -> Translated:
     try:
-        cards = read_cards(path)
+        cards = without_unused(read_cards(path), report)
         report.screen(cards)
         model = read_model(cards, report)
         report.check()

@@ -78,7 +78,7 @@ _REFUSED = (
     (r"(B|PIPE|ELBOW)[23]", "beams are not available; use solid elements"),
     (r"T[23]D", "trusses are not available; use solid elements"),
     (r"M3D|SFM|MAX|MGAX", "membranes and surface elements are not available; use solid elements"),
-    (r"R[23]D|RAX|RB", "rigid elements are not available; mesh a stiff body"),
+    (r"RB", "rigid beams are not available; mesh a stiff body"),
     (r"SPRING|DASHPOT|CONN|JOINT|GAP|MASS|ROTARYI",
      "springs, masses, gaps and connectors are not available; hold or load the bodies"),
     (r"U\d", "user elements cannot be run; use solid elements"),
@@ -86,6 +86,10 @@ _REFUSED = (
     (r"AC|DC|EC|Q3D", "only stresses are computed; use stress elements such as C3D8"),
 )  # fmt: skip
 """Patterns of element types that are refused, with what would help: the one place to look."""
+
+
+RIGID_ELEMENTS = {"R2D2": 2, "RAX2": 2, "R3D3": 3, "R3D4": 4}
+"""Types of rigid elements, which are no cells, with the number of their nodes."""
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, DeckError, key
@@ -13,7 +14,7 @@ from fxcrack.deck.element_checks import check_nodes, one_kind, repetitions
 from fxcrack.deck.elements import face_nodes, to_dolfinx
 from fxcrack.deck.model import Model
 from fxcrack.deck.raising import raise_order
-from fxcrack.deck.spaces import HOME, NamedSet, Space, SurfaceDef, distinct, existing
+from fxcrack.deck.spaces import HOME, NamedSet, Space, SurfaceDef, distinct, missing
 from fxcrack.mesh.raw import row_ids
 
 _PLANE = 1e-9
@@ -128,6 +129,7 @@ class Flat:
         self._check_plane()
         self._faces: tuple[Ints, Ints] | None = None
         self._combining: list[Card] = []
+        self._said: set[str] = set()
 
     def _check_plane(self) -> None:
         """Refuse plane elements off the plane z = 0."""
@@ -175,12 +177,24 @@ class Flat:
             placed = self.placed[space_name or place]
             if kind == "nsets":
                 at = placed.space.nodes.find(labels)
-                at = existing(found.card, found.name, labels, at, "nodes") + placed.first_node
+                at = self._existing(found, labels, at, "nodes") + placed.first_node
             else:
                 at = placed.cell_of(labels)
-                at = existing(found.card, found.name, labels, at, "elements")
+                keep = (at >= 0) | ~np.isin(labels, placed.space.rigid_labels)
+                labels, at = labels[keep], at[keep]
+                at = self._existing(found, labels, at, "elements")
             out.append(at)
         return distinct(np.concatenate(out)) if out else np.zeros(0, dtype=np.int64)
+
+    def _existing(self, found: NamedSet, labels: Ints, at: Ints, what: str) -> Ints:
+        """Positions of the members of a set that exist; the others are warned of once."""
+        self._warn_once(missing(found.card, found.name, labels, at, what))
+        return at[at >= 0]
+
+    def _warn_once(self, text: str | None) -> None:
+        if text is not None and text not in self._said:
+            self._said.add(text)
+            log.warn("%s", text)
 
     def _member(self, card: Card, name: str, index: int | None, kind: str) -> Ints:
         """One node or element, "12" or "inst.12"."""
@@ -220,7 +234,7 @@ class Flat:
         parts = []
         for space_name, labels in found.members.items():
             placed = self.placed[space_name or place]
-            at = existing(found.card, found.name, labels, placed.space.nodes.find(labels), "nodes")
+            at = self._existing(found, labels, placed.space.nodes.find(labels), "nodes")
             parts.append(at + placed.first_node)
         return np.concatenate(parts)
 
@@ -229,6 +243,10 @@ class Flat:
         if key(name).rpartition(".")[2].isdigit():
             return self._member(card, name, index, "elsets")
         return self._of_set(*self._resolve(card, name, "elsets", index), "elsets")
+
+    def element_set(self, card: Card, name: str) -> tuple[str, NamedSet]:
+        """The space and the element set that a name means."""
+        return self._resolve(card, name, "elsets", None)
 
     def in_space(self, space: str, card: Card, elset: str) -> Ints:
         """Cells of an element set of one space (sections of instances)."""
@@ -286,28 +304,46 @@ class Flat:
         rows, count = self._face_ids
         return np.asarray(rows[cells][count[cells] == 1])
 
-    def surface(self, card: Card, name: str, index: int | None = None) -> Ints:
+    def surface(
+        self, card: Card, name: str, index: int | None = None, *, whole: bool = True
+    ) -> Ints:
         """Nodes of the facets of a surface, rows as of :meth:`faces`.
+
+        Args:
+            card: For messages.
+            name: Of the surface.
+            index: Data line, for messages.
+            whole: Refuse a surface of nodes that has nodes beside its facets; else they are warned
+                of and left out.
 
         Raises:
             DeckError: There is no such surface, or it is none of facets.
         """
+        return self.facets_of(*self.surface_def(card, name, index), whole=whole)
+
+    def surface_def(self, card: Card, name: str, index: int | None) -> tuple[str, SurfaceDef]:
+        """The space and the definition of a surface.
+
+        Raises:
+            DeckError: There is no such surface.
+        """
         place, found = self._resolve(card, name, "surfaces", index)
         assert isinstance(found, SurfaceDef)
-        return self.facets_of(place, found)
+        return place, found
 
-    def facets_of(self, place: str, surface: SurfaceDef) -> Ints:
+    def facets_of(self, place: str, surface: SurfaceDef, *, whole: bool = True) -> Ints:
         """Nodes of the facets of a surface of a space; rows as of :meth:`faces`."""
         card = surface.card
         kind = card.word("TYPE", "ELEMENT")
         if self.kind.shell:
             return np.asarray(self.cells[self._side_of(place, surface)[0]])
         if kind == "NODE":
-            return self._node_surface(card, place)
+            return self._node_surface(card, place, whole=whole)
         if kind != "ELEMENT":
             card.fail(
-                f"TYPE={kind} is not available; define surfaces by element faces (TYPE=ELEMENT) or "
-                "nodes (TYPE=NODE), and rigid ones by the faces of a stiff body"
+                f"TYPE={kind} is not available here; define surfaces by element faces "
+                "(TYPE=ELEMENT) or nodes (TYPE=NODE): analytical rigid surfaces are masters of "
+                "*CONTACT PAIR, the second of its two surfaces"
             )
         if card.has("COMBINE"):
             return self._combined(place, card)
@@ -362,9 +398,7 @@ class Flat:
         Raises:
             DeckError: There is no such surface, or it is no side of shells.
         """
-        place, found = self._resolve(card, name, "surfaces", index)
-        assert isinstance(found, SurfaceDef)
-        return self._side_of(place, found)
+        return self._side_of(*self.surface_def(card, name, index))
 
     def _side_of(self, place: str, surface: SurfaceDef) -> tuple[Ints, str]:
         card = surface.card
@@ -418,8 +452,7 @@ class Flat:
 
     def surface_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
         """Nodes of a surface of faces or of nodes, ascending."""
-        place, found = self._resolve(card, name, "surfaces", index)
-        assert isinstance(found, SurfaceDef)
+        place, found = self.surface_def(card, name, index)
         if found.card.word("TYPE") == "NODE":
             return self._surface_node_list(found.card, place)
         if self.kind.shell:
@@ -433,7 +466,7 @@ class Flat:
         ]
         return distinct(np.concatenate(parts))
 
-    def _node_surface(self, card: Card, place: str) -> Ints:
+    def _node_surface(self, card: Card, place: str, *, whole: bool) -> Ints:
         """Faces of a surface of nodes: those on the outside all of whose nodes belong to it."""
         nodes = self._surface_node_list(card, place)
         inside = np.zeros(len(self.points), dtype=bool)
@@ -442,12 +475,14 @@ class Flat:
         rows = self.outside(np.arange(len(self.cells)))
         rows = rows[inside[rows].all(axis=1)]
         lost = np.setdiff1d(nodes[self.used[nodes]], rows)
-        if len(lost) or not len(rows):
-            card.fail(
-                f"{len(lost) or len(nodes)} of {len(nodes)} nodes of this surface belong to no "
-                "element face whose other nodes belong to it as well; define the surface by "
-                "element faces, TYPE=ELEMENT"
-            )
+        text = (
+            f"{len(lost) or len(nodes)} of {len(nodes)} nodes of this surface belong to no element "
+            "face whose other nodes belong to it as well"
+        )
+        if not len(rows) or (len(lost) and whole):
+            card.fail(f"{text}; define the surface by element faces, TYPE=ELEMENT")
+        if len(lost):
+            self._warn_once(f"{card.place}: {text}; they are not tied")
         return np.asarray(rows)
 
     def node_names(self, nodes: Ints) -> tuple[str, ...]:

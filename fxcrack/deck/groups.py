@@ -80,13 +80,16 @@ class Groups:
         """Name of a group of facets, rows of :meth:`Flat.faces`."""
         return self._add(name, "facets", words, rows)
 
-    def surface(self, card: Card, name: str, index: int | None = None) -> str | Face:
+    def surface(
+        self, card: Card, name: str, index: int | None = None, *, whole: bool = True
+    ) -> str | Face:
         """Group of facets of a surface of the deck, or the side of shells that it is.
 
         Args:
             card: For messages.
             name: Of the surface.
             index: Data line, for messages.
+            whole: As of :meth:`Flat.surface`.
 
         Raises:
             DeckError: There is no such surface, or it is none of facets.
@@ -94,7 +97,7 @@ class Groups:
         if self._flat.kind.shell:
             cells, side = self._flat.shell_side(card, name, index)
             return Face(self.cells(name, cells, words="surface"), side)
-        return self.facets(name, self._flat.surface(card, name, index))
+        return self.facets(name, self._flat.surface(card, name, index, whole=whole))
 
     def cells(self, name: str, cells: Ints, *, words: str = "elements") -> str:
         """Name of a group of cells."""

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["read", "output", "numerics", "refused"]
+Kind = Literal["read", "output", "numerics", "replaced", "refused"]
 
 
 @dataclass(frozen=True)
@@ -18,10 +18,11 @@ class Keyword:
 
     Attributes:
         kind: "read"; "output", ignored; "numerics", a control of another program's solution
-            method, left out and said so; "refused".
+            method, left out and said so; "replaced", left out in favour of what ``help`` says;
+            "refused".
         parameters: Parameters that are read, squeezed.
         harmless: Parameters that change nothing here.
-        help: For refused ones, what would help.
+        help: For refused ones, what would help; for replaced ones, what is computed instead.
     """
 
     kind: Kind
@@ -38,6 +39,8 @@ _READ = {
     # mesh, sets, surfaces
     "NODE": ("NSET, INPUT, SYSTEM", ""),
     "ELEMENT": ("TYPE, ELSET, INPUT", ""),
+    "SYSTEM": ("", ""),
+    "TRANSFORM": ("NSET, TYPE", ""),
     "NSET": ("NSET, GENERATE, ELSET, INSTANCE, UNSORTED", "INTERNAL, INPUT"),
     "ELSET": ("ELSET, GENERATE, INSTANCE", "INTERNAL, UNSORTED, INPUT"),
     "NGEN": ("NSET, LINE", ""),
@@ -45,7 +48,7 @@ _READ = {
     "NCOPY": ("OLD SET, NEW SET, CHANGE NUMBER, SHIFT, REFLECT, MULTIPLE", ""),
     "ELGEN": ("ELSET", ""),
     "ELCOPY": ("OLD SET, NEW SET, ELEMENT SHIFT, SHIFT NODES", ""),
-    "SURFACE": ("NAME, TYPE, COMBINE", "INTERNAL"),
+    "SURFACE": ("NAME, TYPE, COMBINE, FILLET RADIUS", "INTERNAL"),
     "PART": ("NAME", ""),
     "END PART": ("", ""),
     "INSTANCE": ("NAME, PART", ""),
@@ -55,10 +58,18 @@ _READ = {
     # sections, materials
     "SOLID SECTION": ("ELSET, MATERIAL, ORIENTATION", "CONTROLS"),
     "SHELL SECTION": (
-        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON, OFFSET, SYMMETRIC",
-        "CONTROLS, SECTION INTEGRATION, LAYUP",
+        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON, OFFSET, SYMMETRIC, "
+        "SHELL THICKNESS, THICKNESS MODULUS",
+        "CONTROLS, SECTION INTEGRATION, LAYUP, TEMPERATURE",
     ),
-    "ORIENTATION": ("NAME, SYSTEM, DEFINITION", ""),
+    "SHELL GENERAL SECTION": (
+        "ELSET, MATERIAL, ORIENTATION, COMPOSITE, STACK DIRECTION, POISSON, OFFSET, SYMMETRIC, "
+        "SHELL THICKNESS, THICKNESS MODULUS",
+        "CONTROLS, LAYUP",
+    ),
+    "ORIENTATION": ("NAME, SYSTEM, DEFINITION", "LOCAL DIRECTIONS"),
+    "DISTRIBUTION": ("NAME, LOCATION, INPUT", "TABLE"),
+    "DISTRIBUTION TABLE": ("", "NAME"),
     "MATERIAL": ("NAME", "SRANGE, RTOL"),
     "ELASTIC": ("TYPE", "MODULI"),
     "PLASTIC": ("HARDENING", ""),
@@ -160,6 +171,12 @@ _NUMERICS = (
     "HOURGLASS STIFFNESS, SOLVER CONTROLS"
 )
 
+_SHEAR = "the transverse shear stiffness of shells is that of the equilibrium of their plies"
+_REPLACED = {
+    "TRANSVERSE SHEAR STIFFNESS": _SHEAR,
+    "TRANSVERSE SHEAR": _SHEAR,
+}
+
 _SHELLS = (
     "it is not available; shells (S4R, S8R, SC8R) have *SHELL SECTION with a thickness or plies"
 )
@@ -179,9 +196,6 @@ _THERMAL = "heat is not computed; prescribe temperatures by *TEMPERATURE"
 _PERTURBATION = "only *STATIC, *VISCO, *DYNAMIC, *DIRECT CYCLIC with FATIGUE and *FATIGUE are"
 
 _REFUSED = {
-    "SHELL GENERAL SECTION": _SHELLS,
-    "TRANSVERSE SHEAR STIFFNESS": _SHELLS,
-    "TRANSVERSE SHEAR": _SHELLS,
     "NODAL THICKNESS": _SHELLS,
     "SHELL TO SOLID COUPLING": _SHELLS,
     "MEMBRANE SECTION": "membranes are not available; use solid elements",
@@ -214,8 +228,6 @@ _REFUSED = {
     "EMBEDDED ELEMENT": "embedded elements are not available; mesh them into the body",
     "PRE-TENSION SECTION": "prescribe the displacement of the bolt's end instead",
     "SUBMODEL": "prescribe the boundary's displacements by *BOUNDARY",
-    "TRANSFORM": "displacements are along the global axes; turn the model so that they fit",
-    "SYSTEM": "give the nodes in global coordinates",
     "NMAP": "give the nodes in global coordinates",
     "FIELD": "field variables are not available; only *TEMPERATURE is",
     "CREEP": "creep is not available; elastic and plastic materials are",
@@ -237,11 +249,10 @@ _REFUSED = {
     "MODAL DYNAMIC": _PERTURBATION,
     "SOILS": _PERTURBATION,
     "LOAD CASE": "write one *STEP for each case",
-    "RIGID SURFACE": "analytical rigid surfaces are not available; mesh a stiff body",
+    "RIGID SURFACE": "write *SURFACE, TYPE=SEGMENTS (CYLINDER, REVOLUTION) and *RIGID BODY, "
+    "ANALYTICAL SURFACE",
     "SURFACE SECTION": "surface elements are not available; load element faces by *DSLOAD",
     "IMPORT": "give the model in this deck; states of other analyses are not imported",
-    "DISTRIBUTION": "give one *SOLID SECTION for each part with properties of its own",
-    "DISTRIBUTION TABLE": "give one *SOLID SECTION for each part with properties of its own",
     "COMPOSITE LAYUP": "give each ply its own elements and *SOLID SECTION",
     "IMPERFECTION": "give the nodes of the imperfect body",
 }
@@ -257,6 +268,8 @@ def _table() -> dict[str, Keyword]:
         found[_squeezed(name)] = Keyword("output")
     for name in _NUMERICS.split(","):
         found[_squeezed(name)] = Keyword("numerics")
+    for name, text in _REPLACED.items():
+        found[_squeezed(name)] = Keyword("replaced", help=text)
     for name, text in _REFUSED.items():
         found[_squeezed(name)] = Keyword("refused", help=text)
     for name, (parameters, harmless) in _READ.items():
@@ -269,7 +282,7 @@ KEYWORDS = _table()
 
 TITLES = {
     _squeezed(name): name.strip()
-    for name in [*_READ, *_REFUSED, *_OUTPUT.split(","), *_NUMERICS.split(",")]
+    for name in [*_READ, *_REPLACED, *_REFUSED, *_OUTPUT.split(","), *_NUMERICS.split(",")]
 }
 """Keywords as users write them, by their squeezed names."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fxcrack.base.arrays import Array
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.face import Face
 from fxcrack.continuum.loads import (
@@ -23,31 +23,14 @@ from fxcrack.deck.cards import Card, Row, key, label, squeeze
 from fxcrack.deck.constraints import Carrier
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
+from fxcrack.deck.load_fields import Centrifugal, Hydrostatic
 from fxcrack.deck.report import Report
 from fxcrack.deck.thermal import NodalField
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track
+from fxcrack.deck.transforms import Transforms
 
 _BODY = {"BX": 0, "BY": 1, "BZ": 2}
 _KINDS = ("CLOAD", "DLOAD", "DSLOAD")
-
-
-@dataclass(frozen=True)
-class Hydrostatic:
-    """A pressure linear in one coordinate.
-
-    Attributes:
-        axis: The coordinate, 0, 1 or 2.
-        zero: Where the pressure is 0, length.
-        full: Where it is 1, length.
-    """
-
-    axis: int
-    zero: float
-    full: float
-
-    def __call__(self, x: Array) -> Array:
-        """Values at positions of shape (3, n)."""
-        return np.asarray((x[self.axis] - self.zero) / (self.full - self.zero))
 
 
 @dataclass(eq=False)
@@ -59,7 +42,8 @@ class LoadEntry:
         kind: Keyword of its card.
         name: Of the set or surface, empty for the whole model.
         type: P, BX, GRAV, TRVEC, ... or the component of a force.
-        direction: Of gravity and tractions.
+        direction: Of gravity and tractions; of the axis of a rotation.
+        point: A point of that axis.
         zero: Coordinates at which a hydrostatic pressure is 0 and has its value.
         track: What it does.
         value: Present reference value.
@@ -72,6 +56,7 @@ class LoadEntry:
     name: str
     type: str
     direction: tuple[float, ...] = ()
+    point: tuple[float, ...] = ()
     zero: tuple[float, float] = (0.0, 0.0)
     track: Track = field(default_factory=Track)
     value: float = 0.0
@@ -88,6 +73,7 @@ class Loads:
         report: Takes notes.
         finite: Whether bodies turn far (NLGEOM).
         carriers: What carries the loads of reference nodes and nodes of equations, by node.
+        transforms: Axes of nodes, along which their forces are.
     """
 
     def __init__(
@@ -98,8 +84,10 @@ class Loads:
         *,
         finite: bool,
         carriers: Mapping[int, Carrier],
+        transforms: Transforms,
     ) -> None:
         self._flat = flat
+        self._transforms = transforms
         self._amplitudes = amplitudes
         self._report = report
         self._finite = finite
@@ -128,7 +116,9 @@ class Loads:
             given: set[tuple[str, ...]] = set()
             for card in chosen:
                 curve = self._amplitudes.of(card)
-                for row in card.need_rows("node, element set or surface, type, value"):
+                if card not in fresh:
+                    card.need_rows("node, element set or surface, type, value")
+                for row in card.rows():
                     mark, value = self._read(row)
                     entry = self._entries[mark]
                     if mark in given:
@@ -182,12 +172,21 @@ class Loads:
                 )
         elif word == "GRAV":
             entry.direction = self._direction(row, 3)
+        elif word in ("CENTRIF", "CENT"):
+            entry.point, entry.direction = self._axis_of_rotation(row)
+            if self._finite:
+                self._report.replace("the centrifugal force is that of the undeformed bodies", card)
         elif word not in _BODY or _BODY[word] >= self._flat.kind.gdim:
             row.fail(
-                f"load type {row.text(1)} is not available; P1 to P6, HP1 to HP6, BX, BY, BZ and "
-                "GRAV are"
+                f"load type {row.text(1)} is not available; P1 to P6, HP1 to HP6, BX, BY, BZ, "
+                "GRAV, CENTRIF and CENT are"
             )
-        mark = (card.keyword, key(name), word, *(f"{d:.12g}" for d in entry.direction))
+        mark = (
+            card.keyword,
+            key(name),
+            word,
+            *(f"{d:.12g}" for d in (*entry.direction, *entry.point)),
+        )
         self._entries.setdefault(mark, self._started(entry))
         return mark, row.number(2)
 
@@ -196,6 +195,15 @@ class Loads:
         if not found.any():
             row.fail("the direction of the load is missing; give its components")
         return tuple(float(c) for c in found / np.linalg.norm(found))
+
+    def _axis_of_rotation(self, row: Row) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """A point of the axis and its direction; in a plane z, of bodies of revolution y."""
+        if self._flat.kind.model == "axisymmetric":
+            return (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)
+        point = tuple(row.number(3 + i, 0.0) for i in range(3))
+        if self._flat.kind.gdim == 2 and not any(row.text(i) for i in (6, 7, 8)):
+            return point, (0.0, 0.0, 1.0)
+        return point, self._direction(row, 6)
 
     def _force(self, row: Row) -> tuple[tuple[str, ...], float]:
         if row.card.has("FOLLOWER"):
@@ -272,6 +280,9 @@ class Loads:
                 continue
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
+            if self._transforms.turned[nodes].any():
+                out.append(self._along_own_axes(entry, amplitude, force, nodes, where))
+                continue
             moment, force = force[3:], force[: self._flat.kind.gdim]
             axes = "".join("xyz"[i] for i in np.flatnonzero(force))
             title = name if alone else f"{name}.{axes}"
@@ -298,14 +309,25 @@ class Loads:
                 "with NLGEOM a coupling distributes forces through the centre of its surface only, "
                 "neither moments nor forces beside it; write NLGEOM=NO"
             )
-        forces = carrier.forces(entry.row, load[:3], load[3:], gdim) * len(carrier.nodes)
+        turn = self._transforms.frames[self._flat.nodes(entry.row.card, entry.name)[0]]
+        force, moment = load[:3] @ turn, load[3:] @ turn
+        forces = carrier.forces(entry.row, force, moment, gdim) * len(carrier.nodes)
         where = groups.nodes(carrier.name, carrier.nodes, words="coupling")
         x = flat.points[carrier.nodes][:, :gdim]
-        fields: list[Field] = []
-        for values in forces.T:
-            same = np.ptp(values) <= 1e-14 * np.abs(forces).max()
-            fields.append(float(values.mean()) if same else NodalField(x, values))
-        return PointForce(where, tuple(fields), amplitude, entry.name)
+        return PointForce(where, _fields(x, forces), amplitude, entry.name)
+
+    def _along_own_axes(
+        self, entry: LoadEntry, amplitude: AmplitudeLike, load: Array, nodes: Ints, where: str
+    ) -> Load:
+        """A force on each of some nodes along the axes of that node."""
+        if load[3:].any():
+            entry.row.fail(
+                "moments along axes of a *TRANSFORM are not available; give them along global axes"
+            )
+        gdim = self._flat.kind.gdim
+        forces = np.einsum("nlg,l->ng", self._transforms.frames[nodes], load[:3])[:, :gdim]
+        x = self._flat.points[nodes][:, :gdim]
+        return PointForce(where, _fields(x, forces * len(nodes)), amplitude, entry.name)
 
     def _of(
         self,
@@ -345,24 +367,41 @@ class Loads:
             where = groups.facets(f"{entry.name}.P{face}", rows)
             return [self._on_facets(entry, where, value, amplitude, title(where))]
         name = entry.name or "gravity"
-        if entry.type == "GRAV":
+        if entry.type == "CENT":
+            body = groups.cells(entry.name, cells) if entry.name else None
+            force = self._centrifugal(entry, value)
+            return [BodyForce(force, body, amplitude, title(f"{name}.CENT"))]
+        if entry.type in ("GRAV", "CENTRIF"):
+            what = "gravity" if entry.type == "GRAV" else "a centrifugal force"
             out: list[Load] = []
             for section, density in densities.items():
                 if entry.name and not np.isin(cells, groups.cells_of(section)).any():
                     continue
                 if density is None:
-                    entry.row.fail(f"gravity needs the *DENSITY of the material of '{section}'")
+                    entry.row.fail(f"{what} needs the *DENSITY of the material of '{section}'")
                 heavy = np.intersect1d(cells, groups.cells_of(section))
-                weight = tuple(value * density * d for d in entry.direction[:gdim])
+                weight: tuple[Field, ...] = tuple(
+                    value * density * d for d in entry.direction[:gdim]
+                )
+                if entry.type == "CENTRIF":
+                    weight = self._centrifugal(entry, value * density)
                 where = section
                 if len(heavy) < len(groups.cells_of(section)):
                     where = groups.cells(f"{name} {section}", heavy)
                 out.append(BodyForce(weight, where, amplitude, title(f"{name} {section}")))
             return out
-        force = np.zeros(gdim)
-        force[_BODY[entry.type]] = value
+        constant = np.zeros(gdim)
+        constant[_BODY[entry.type]] = value
         body = groups.cells(entry.name, cells) if entry.name else None
-        return [BodyForce(tuple(force.tolist()), body, amplitude, title(f"{name}.{entry.type}"))]
+        return [BodyForce(tuple(constant.tolist()), body, amplitude, title(f"{name}.{entry.type}"))]
+
+    def _centrifugal(self, entry: LoadEntry, factor: float) -> tuple[Field, ...]:
+        """Force per volume of a rotation, per distance from the axis a factor."""
+        px, py, pz = entry.point
+        dx, dy, dz = entry.direction
+        return tuple(
+            Centrifugal(factor, (px, py, pz), (dx, dy, dz), i) for i in range(self._flat.kind.gdim)
+        )
 
     def _on_facets(
         self, entry: LoadEntry, where: str | Face, value: float, amplitude: AmplitudeLike, name: str
@@ -373,18 +412,15 @@ class Loads:
         if entry.type[:2] == "HP":
             # from the level where it is 0 to that where it has its value
             axis = 1 if self._flat.kind.gdim == 2 else 2
-            shape = Hydrostatic(axis, *entry.zero)
-            field = _Scaled(value, shape)
+            field = Hydrostatic(value, axis, *entry.zero)
             return Pressure(where, field, amplitude, name, entry.follows)
         return Pressure(where, value, amplitude, name, entry.follows)
 
 
-@dataclass(frozen=True)
-class _Scaled:
-    """A number times a function of position."""
-
-    factor: float
-    function: Hydrostatic
-
-    def __call__(self, x: Array) -> Array:
-        return self.factor * self.function(x)
+def _fields(x: Array, forces: Array) -> tuple[Field, ...]:
+    """Components of forces on nodes, shape (n, gdim): numbers where all nodes have the same."""
+    fields: list[Field] = []
+    for values in forces.T:
+        same = np.ptp(values) <= 1e-14 * np.abs(forces).max()
+        fields.append(float(values.mean()) if same else NodalField(x, values))
+    return tuple(fields)

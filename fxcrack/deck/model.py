@@ -10,10 +10,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Ints
+from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, DeckError, Row, key, label, to_float, whole_numbers
-from fxcrack.deck.elements import element_type
+from fxcrack.deck.elements import RIGID_ELEMENTS, element_type
 from fxcrack.deck.generators import (
     axis_rotation,
     copy_elements,
@@ -22,11 +22,10 @@ from fxcrack.deck.generators import (
     generate_elements,
     generate_nodes,
 )
+from fxcrack.deck.left_out import OF_INTERACTIONS, OF_MATERIALS
 from fxcrack.deck.report import Report
 from fxcrack.deck.spaces import HOME, Elements, Numbered, Space, SurfaceDef
 
-_OF_MATERIALS = ("ELASTIC", "PLASTIC", "EXPANSION", "DENSITY", "HYPERELASTIC", "DAMPING")
-_OF_INTERACTIONS = ("FRICTION", "SURFACEBEHAVIOR", "COHESIVEBEHAVIOR", "FRACTURECRITERION")
 _GENERATORS = {
     "NGEN": generate_nodes,
     "NFILL": fill_nodes,
@@ -101,6 +100,7 @@ class _Walk:
         self._family: Family | None = None
         self._step: Family | None = None
         self._early: list[tuple[Space, Card]] = []
+        self._system: tuple[Array, Array] | None = None
 
     def run(self, cards: list[Card]) -> Model:
         for card in cards:
@@ -170,8 +170,8 @@ class _Walk:
         if self._step is not None and word not in ("ENDSTEP", "STEP"):
             self._step.cards.append(card)
             return
-        if word in _OF_MATERIALS + _OF_INTERACTIONS:
-            wanted = "materials" if word in _OF_MATERIALS else "interactions"
+        if word in OF_MATERIALS + OF_INTERACTIONS:
+            wanted = "materials" if word in OF_MATERIALS else "interactions"
             if self._family is None or self._family not in getattr(self._model, wanted).values():
                 card.fail(
                     "there is no *MATERIAL before it"
@@ -196,6 +196,7 @@ class _Walk:
         if self._space is not self._model.root or key(name) in self._model.parts:
             card.fail(f"part '{name}' begins inside another, or exists already")
         self._space = self._model.parts[key(name)] = Space(name)
+        self._system = None
 
     def _instance(self, card: Card) -> None:
         name, part = card.text("NAME"), card.text("PART")
@@ -222,7 +223,7 @@ class _Walk:
         if self._space is self._model.root:
             card.fail("it ends nothing; its beginning is missing")
         self._resolve_early()
-        self._space = self._model.root
+        self._space, self._system = self._model.root, None
 
     def _nothing(self, card: Card) -> None:
         """Words that only bracket others."""
@@ -245,15 +246,48 @@ class _Walk:
         if system == "C":
             angle = np.radians(x[:, 1])
             x[:, 0], x[:, 1] = x[:, 0] * np.cos(angle), x[:, 0] * np.sin(angle)
+        elif system == "S":  # distance, longitude from x, latitude from the plane of x and y
+            distance, longitude, latitude = x[:, 0].copy(), *np.radians(x[:, 1:]).T
+            x[:, 0] = distance * np.cos(latitude) * np.cos(longitude)
+            x[:, 1] = distance * np.cos(latitude) * np.sin(longitude)
+            x[:, 2] = distance * np.sin(latitude)
         elif system != "R":
-            card.fail(f"SYSTEM={system} is not available; R and C (cylindrical) are")
+            card.fail(f"SYSTEM={system} is not available; R, C (cylindrical) and S (spherical) are")
+        if self._system is not None:
+            origin, turn = self._system
+            x = origin + x @ turn
         labels = whole_numbers(card, table[:, 0], "node number")
         self._space.nodes.add(labels, x)
         if card.has("NSET"):
             self._space.add_to_set(card, "nsets", card.text("NSET"), labels)
 
+    def _local_system(self, card: Card) -> None:
+        """Axes of the nodes that follow: a origin, b on axis 1, c in the plane of axes 1 and 2."""
+        values = [row.number(i, 0.0) for row in card.rows()[:2] for i in range(6)][:9]
+        if not card.lines:
+            self._system = None
+            return
+        if not any(card.rows()[0].text(i) for i in (3, 4, 5)):
+            self._system = np.array(values[:3]), np.eye(3)
+            return
+        a, b, c = (np.array(values[i : i + 3] or [0.0] * 3) for i in (0, 3, 6))
+        if len(card.lines) < 2 or not any(values[6:]):  # axis 3 is then z
+            third = np.array([0.0, 0.0, 1.0])
+        else:
+            third = np.cross(b - a, c - a)
+        one = b - a
+        if not np.linalg.norm(np.cross(third, one)) > 1e-10 * np.linalg.norm(one):
+            card.fail("its points do not give axes; give the origin, a point on axis 1 and another")
+        one, third = one / np.linalg.norm(one), third / np.linalg.norm(third)
+        self._system = a, np.array([one, np.cross(third, one), third])
+
     def _element(self, card: Card) -> None:
         name = card.text("TYPE").upper()
+        if name in RIGID_ELEMENTS:
+            table = self._element_table(card, name, RIGID_ELEMENTS[name])
+            rigid = self._space.rigid.setdefault(name, Numbered(RIGID_ELEMENTS[name]))
+            rigid.add(table[:, 0], table[:, 1:])
+            return
         kind = element_type(name)
         if isinstance(kind, str):
             line = f"{card.place}: element type {name} is refused: {kind}"
@@ -265,17 +299,22 @@ class _Walk:
             return
         for note in kind.notes:
             self._report.replace(f"element type {name}: {note}", card)
-        values, width = card.flat(), kind.n_nodes + 1
+        table = self._element_table(card, name, kind.n_nodes)
+        block = self._space.elements.setdefault(name, Elements(kind, Numbered(kind.n_nodes), card))
+        block.table.add(table[:, 0], table[:, 1:])
+
+    def _element_table(self, card: Card, name: str, n_nodes: int) -> Ints:
+        """Numbers and nodes of elements, shape (n, 1 + n_nodes); they come into their set."""
+        values, width = card.flat(), n_nodes + 1
         if len(values) % width:
             card.fail(
                 f"{len(values)} numbers are no whole number of {name} elements, which have a "
-                f"number and {kind.n_nodes} nodes each"
+                f"number and {n_nodes} nodes each"
             )
         table = whole_numbers(card, values, "element or node number").reshape(-1, width)
-        block = self._space.elements.setdefault(name, Elements(kind, Numbered(kind.n_nodes), card))
-        block.table.add(table[:, 0], table[:, 1:])
         if card.has("ELSET"):
             self._space.add_to_set(card, "elsets", card.text("ELSET"), table[:, 0])
+        return table
 
     # -- sets and surfaces ---------------------------------------------------------------
 
@@ -371,10 +410,20 @@ class _Walk:
     # -- properties ----------------------------------------------------------------------
 
     def _section(self, card: Card) -> None:
+        if card.keyword == "SHELLGENERALSECTION":
+            if not card.has("MATERIAL", "COMPOSITE"):
+                card.fail(
+                    "stiffnesses of the section itself are not available; give MATERIAL with the "
+                    "thickness, or COMPOSITE with the plies"
+                )
+            card.keyword = "SHELLSECTION"
         self._space.sections.append(card)
 
     def _orientation(self, card: Card) -> None:
         self._space.orientations[key(card.text("NAME"))] = card
+
+    def _distribution(self, card: Card) -> None:
+        self._space.distributions[key(card.text("NAME"))] = card
 
     def _material(self, card: Card) -> None:
         self._named(card, self._model.materials)
@@ -414,13 +463,17 @@ _PLACES = {
     "ASSEMBLY": _Walk._nothing,
     "ENDASSEMBLY": _Walk._nothing,
     "NODE": _Walk._node,
+    "SYSTEM": _Walk._local_system,
     "ELEMENT": _Walk._element,
     "NSET": _Walk._nset,
     "ELSET": _Walk._elset,
     "SURFACE": _Walk._surface,
     "SOLIDSECTION": _Walk._section,
     "SHELLSECTION": _Walk._section,
+    "SHELLGENERALSECTION": _Walk._section,
     "ORIENTATION": _Walk._orientation,
+    "DISTRIBUTION": _Walk._distribution,
+    "DISTRIBUTIONTABLE": _Walk._nothing,
     "MATERIAL": _Walk._material,
     "SURFACEINTERACTION": _Walk._interaction,
     "AMPLITUDE": _Walk._amplitude,

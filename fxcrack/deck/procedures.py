@@ -98,11 +98,19 @@ def read_procedures(steps: Sequence[Family], report: Report) -> list[Procedure]:
     controls, time, finite = _Controls(), 0.0, False
     for family in steps:
         if family.card.has("PERTURBATION"):
-            family.card.fail(
-                "PERTURBATION, a linear step about the state before, is not available; without it "
-                "a *STATIC step with NLGEOM=NO is linear but for contact"
+            if len(steps) > 1:
+                family.card.fail(
+                    "PERTURBATION, a linear step about the state before, is not available beside "
+                    "others; compute each as a deck of its own, where a *STATIC one begins from "
+                    "the undeformed bodies"
+                )
+            report.replace(
+                "the linear step about the undeformed bodies is computed as one with NLGEOM=NO, in "
+                "which contact opens and closes",
+                family.card,
             )
-        finite = _nlgeom(family.card, finite)
+        else:
+            finite = _nlgeom(family.card, finite)
         for card in family.cards:
             if card.keyword == "CONTROLS":
                 _read_controls(card, controls, report)

@@ -17,6 +17,7 @@ class Report:
         name: Name of the deck.
         read: What the scene consists of, one line each.
         replaced: What is computed in another way than the deck says, one line each.
+        doubts: Where the deck's own choice costs accuracy, one line each.
         ignored: Output requests and the like, by their titles with how often they occur.
         refused: What fxcrack has no word for: file, line, card, and what would help.
     """
@@ -24,6 +25,7 @@ class Report:
     name: str
     read: list[str] = field(default_factory=list)
     replaced: list[str] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
     ignored: dict[str, int] = field(default_factory=dict)
     refused: list[str] = field(default_factory=list)
 
@@ -32,6 +34,14 @@ class Report:
         line = text if card is None else f"{card.place}: {card.title}: {text}"
         if line not in self.replaced:
             self.replaced.append(line)
+
+    def doubt(self, text: str, card: Card) -> None:
+        """Note what costs accuracy."""
+        self.doubts.append(f"{card.place}: {card.title}: {text}")
+
+    def leave(self, text: str) -> None:
+        """Note something that plays no part in what is computed."""
+        self.ignored[text] = self.ignored.get(text, 0) + 1
 
     def screen(self, cards: list[Card]) -> None:
         """Note every card that is ignored, left out or refused because of its words alone."""
@@ -57,6 +67,8 @@ class Report:
                 self.ignored[card.title] = self.ignored.get(card.title, 0) + 1
             elif known.kind == "numerics":
                 self.replace("a control of the other program's solution method; left out", card)
+            elif known.kind == "replaced":
+                self.replace(known.help, card)
             elif known.kind == "refused":
                 self.refused.append(f"{card.place}: {card.title} is refused: {known.help}")
             else:
@@ -91,6 +103,7 @@ class Report:
         for title, entries in (
             ("read", self.read),
             ("replaced", self.replaced),
+            ("accuracy", self.doubts),
             ("without effect", [f"{k} ({n} times)" for k, n in self.ignored.items()]),
             ("refused", self.refused),
         ):

@@ -105,23 +105,24 @@ def no_bulk_viscosity(flat: Flat, sections: Sections, *, finite: bool) -> str | 
     return None
 
 
-def check_constraints(supports: Sequence[AnySupport], cards: Sequence[Card]) -> None:
-    """Refuse couplings and equations in explicit dynamics.
+def check_constraints(supports: Sequence[AnySupport], cards: Sequence[Card], flat: Flat) -> None:
+    """Refuse couplings and equations of shells on surface meshes in explicit dynamics.
 
     Args:
         supports: What the constraints are in the words of a scene.
         cards: Model data.
+        flat: The model.
 
     Raises:
         DeckError: One is more than a prescribed displacement.
     """
-    if not any(isinstance(s, Coupling | Equation) for s in supports):
+    if not flat.kind.shell or not any(isinstance(s, Coupling | Equation) for s in supports):
         return
     kinds = ("KINEMATIC", "DISTRIBUTING", "RIGIDBODY", "MPC", "EQUATION")
     card = next(c for c in cards if c.keyword in kinds)
     card.fail(
-        "couplings and equations whose reference is free are not available in explicit dynamics; "
-        "prescribe all its components by *BOUNDARY, or load the nodes themselves"
+        "couplings and equations of shells whose reference is free are not available in explicit "
+        "dynamics; prescribe all its components by *BOUNDARY, or load the nodes themselves"
     )
 
 

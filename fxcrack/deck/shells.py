@@ -14,13 +14,10 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.laminate import Laminate, Ply
-from fxcrack.continuum.materials import Isotropic
 from fxcrack.continuum.section import Section
 from fxcrack.deck.cards import Card, DeckError
 from fxcrack.deck.flat import Flat
 
-_UPRIGHT = 0.1
-"""Component along the normal that the axis of an orientation about which it turns must have."""
 _ALONG = np.cos(np.radians(0.1))
 """Component of the normal along x beyond which the default axis 1 is z."""
 
@@ -66,74 +63,59 @@ def check_normals(flat: Flat) -> None:
     )
 
 
-def section_axis(
-    section: Card,
-    orientation: tuple[Array, int] | None,
-    normals: Array,
-    *,
-    isotropic: bool,
-) -> tuple[float, float, float]:
-    """Direction that is projected on the surface as material axis 1.
+def default_direction(normals: Array, *, isotropic: bool) -> Array:
+    """Direction that is projected on the surface as axis 1 without an orientation, shape (3,).
 
     Args:
-        section: The section, for messages.
-        orientation: Axes of its orientation (rows) and number (from 0) of the axis that is about
-            the normal, ``None`` without an orientation.
-        normals: Normals of its elements, shape (n, 3).
+        normals: Normals of the elements, shape (n, 3).
         isotropic: Whether the direction does not matter.
-
-    Raises:
-        DeckError: The axis of the orientation lies in the surface.
     """
     if isotropic:
-        along = np.abs(normals).max(axis=0)
-        return tuple(float(c) for c in np.eye(3)[int(np.argmin(along))])  # type: ignore[return-value]
-    if orientation is None:
-        axis = np.eye(3)[2 if np.abs(normals[:, 0]).min() > _ALONG else 0]
-        return tuple(float(c) for c in axis)  # type: ignore[return-value]
-    axes, about = orientation
-    if np.abs(normals @ axes[about]).min() < _UPRIGHT:
-        section.fail(
-            f"axis {about + 1} of its *ORIENTATION lies in the surface; on the second data line of "
-            "*ORIENTATION name the axis along the normal (for instance 3, 0.)"
-        )
-    return tuple(float(c) for c in axes[(about + 1) % 3])  # type: ignore[return-value]
+        return np.asarray(np.eye(3)[int(np.argmin(np.abs(normals).max(axis=0)))])
+    return np.asarray(np.eye(3)[2 if np.abs(normals[:, 0]).min() > _ALONG else 0])
 
 
-def surface_section(card: Card, made: Sequence[Any], axis: tuple[float, float, float]) -> Section:
+def surface_section(
+    card: Card,
+    made: Sequence[Any],
+    axis: tuple[float, float, float],
+    angles: Sequence[float],
+    thickness: float | None,
+) -> Section:
     """Section of a shell.
 
     Args:
         card: ``*SHELL SECTION``.
         made: Material of the section, or of each of its plies, bottom first.
         axis: Direction that is projected as axis 1.
+        angles: Of the plies, degrees.
+        thickness: Of the whole section where a distribution gives it: plies are scaled to it.
 
     Raises:
         DeckError: A thickness, an angle or a material is not possible.
     """
     try:
         if card.has("COMPOSITE"):
+            heights = [row.number(0) for row in card.rows()]
+            whole = sum(heights) * (2.0 if card.has("SYMMETRIC") else 1.0)
+            factor = 1.0 if thickness is None else thickness / whole
             plies = [
-                Ply(row.number(0), row.number(3, 0.0, what="the angle of the ply"), material)
-                for row, material in zip(card.rows(), made, strict=True)
+                Ply(factor * height, angle, material)
+                for height, angle, material in zip(heights, angles, made, strict=True)
             ]
             if card.has("SYMMETRIC"):
                 plies += plies[::-1]
             section = Section(Laminate(plies), axis=axis)
         else:
-            rows = card.need_rows("the thickness")
-            section = Section(made[0], thickness=rows[0].number(0), axis=axis)
+            if thickness is None:
+                thickness = card.need_rows("the thickness")[0].number(0)
+            section = Section(made[0], thickness=thickness, axis=axis)
         shift = _offset(card) * section.height
         return Section(section.material, section.thickness, axis=axis, offset=-shift)
     except InputError as error:
         if isinstance(error, DeckError):
             raise
         return card.fail(str(error))
-
-
-def is_isotropic(made: Sequence[Any]) -> bool:
-    """Whether no material of a section has axes."""
-    return all(isinstance(material, Isotropic) for material in made)
 
 
 def _offset(card: Card) -> float:
@@ -144,4 +126,4 @@ def _offset(card: Card) -> float:
     return card.number("OFFSET", 0.0)
 
 
-__all__ = ["cell_normals", "check_normals", "is_isotropic", "section_axis", "surface_section"]
+__all__ = ["cell_normals", "check_normals", "default_direction", "surface_section"]

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.deck.cards import Card
 from fxcrack.deck.elements import ElementType
@@ -195,11 +194,13 @@ class Space:
         name: Of the part or instance; empty outside of them.
         nodes: Coordinates by number, shape (n, 3).
         elements: Elements by type.
+        rigid: Nodes of rigid elements by type.
         nsets: Sets of nodes by key.
         elsets: Sets of elements by key.
         surfaces: By key.
         sections: Section cards.
         orientations: Orientation cards by key.
+        distributions: Distribution cards by key.
         others: Further cards that belong to it.
         rotation: Of an instance, shape (3, 3).
         shift: Of an instance, after the rotation, shape (3,).
@@ -208,11 +209,13 @@ class Space:
     name: str
     nodes: Numbered = field(default_factory=lambda: Numbered(3))
     elements: dict[str, Elements] = field(default_factory=dict)
+    rigid: dict[str, Numbered] = field(default_factory=dict)
     nsets: dict[str, NamedSet] = field(default_factory=dict)
     elsets: dict[str, NamedSet] = field(default_factory=dict)
     surfaces: dict[str, SurfaceDef] = field(default_factory=dict)
     sections: list[Card] = field(default_factory=list)
     orientations: dict[str, Card] = field(default_factory=dict)
+    distributions: dict[str, Card] = field(default_factory=dict)
     others: list[Card] = field(default_factory=list)
     rotation: Array = field(default_factory=lambda: np.eye(3))
     shift: Array = field(default_factory=lambda: np.zeros(3))
@@ -223,6 +226,7 @@ class Space:
             name,
             self.nodes.copy(),
             {k: Elements(e.kind, e.table.copy(), e.card) for k, e in self.elements.items()},
+            {k: table.copy() for k, table in self.rigid.items()},
             {k: NamedSet(s.name, dict(s.members), s.card, s.internal)
              for k, s in self.nsets.items()},
             {k: NamedSet(s.name, dict(s.members), s.card, s.internal)
@@ -230,12 +234,19 @@ class Space:
             dict(self.surfaces),
             list(self.sections),
             dict(self.orientations),
+            dict(self.distributions),
             list(self.others),
         )  # fmt: skip
 
     def places(self) -> Array:
         """Positions of the nodes, shape (n, 3), length."""
         return np.asarray(self.nodes.rows @ self.rotation.T + self.shift)
+
+    @property
+    def rigid_labels(self) -> Ints:
+        """Numbers of all rigid elements, ascending, shape (n,)."""
+        parts = [table.labels for table in self.rigid.values()]
+        return distinct(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
 
     @property
     def element_labels(self) -> Ints:
@@ -262,17 +273,20 @@ class Space:
         found.add(space, labels, ordered=card.has("UNSORTED"))
 
 
-def existing(card: Card, name: str, labels: Ints, positions: Ints, what: str) -> Ints:
-    """Positions of the members of a set that exist; the others are warned of."""
+def missing(card: Card, name: str, labels: Ints, positions: Ints, what: str) -> str | None:
+    """A warning of the members of a set that do not exist, ``None`` where all do.
+
+    Args:
+        card: The card of the set.
+        name: Its name.
+        labels: Its members, shape (n,).
+        positions: Where they are, -1 where they do not exist, shape (n,).
+        what: "nodes" or "elements".
+    """
     lost = positions < 0
-    if np.any(lost):
-        log.warn(
-            "%s: %d of the %d %s of set '%s' do not exist, the first is %d; they are ignored",
-            card.place,
-            int(lost.sum()),
-            len(labels),
-            what,
-            name,
-            int(labels[lost][0]),
-        )
-    return positions[~lost]
+    if not np.any(lost):
+        return None
+    return (
+        f"{card.place}: {int(lost.sum())} of the {len(labels)} {what} of set '{name}' do not "
+        f"exist, the first is {int(labels[lost][0])}; they are ignored"
+    )

@@ -137,7 +137,9 @@ class Boundary:
                     "*CLOAD"
                 )
             curve = amplitudes.of(card)
-            for row in card.need_rows("node or set, first and last component, value"):
+            if card not in fresh:
+                card.need_rows("node or set, first and last component, value")
+            for row in card.rows():
                 self._take_row(row, curve)
 
     def _take_row(self, row: Row, curve: Curve | None) -> None:

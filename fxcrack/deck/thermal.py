@@ -85,7 +85,9 @@ class Temperatures:
             curve = amplitudes.of(card)
             if curve is not None and curve not in curves:
                 curves.append(curve)
-            for row in card.need_rows("node or set, temperature"):
+            if card.word("OP") != "NEW":
+                card.need_rows("node or set, temperature")
+            for row in card.rows():
                 nodes = self._flat.nodes(card, row.text(0), row.index)
                 wanted[nodes] = self._uniform(row)
         if len(curves) > 1 or (curves and any(not c.has("AMPLITUDE") for c in cards)):

@@ -91,7 +91,10 @@ def thickness_of(cell: str, points: Array, cells: Ints) -> Thickness | None:
         return None
     height = size[at, across]
     size[at, across] = np.inf
-    return Thickness(fewest, float(np.median((size.min(axis=1) / height)[number == fewest])))
+    thin = (number == fewest) & (height > 0.0)  # degenerate cells are refused elsewhere
+    if not thin.any():
+        return None
+    return Thickness(fewest, float(np.median(size.min(axis=1)[thin] / height[thin])))
 
 
 __all__ = ["Thickness", "thickness_of"]

@@ -20,6 +20,7 @@ from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.initial_stress import InitialStress
 from fxcrack.deck.loads import Loads
+from fxcrack.deck.locking import warn_of_locking
 from fxcrack.deck.model import Family, Model
 from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
 from fxcrack.deck.properties import Sections, read_sections
@@ -35,9 +36,9 @@ from fxcrack.deck.rules import (
 from fxcrack.deck.shells import check_normals
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.thermal import Temperatures
-from fxcrack.deck.thickness import thickness_of
 from fxcrack.deck.tips import NodeNames
 from fxcrack.deck.tracks import Amplitudes
+from fxcrack.deck.transforms import read_transforms, turn_boundary
 from fxcrack.deck.velocity import StartingVelocity, starting_velocity
 from fxcrack.effects import FiniteStrain
 from fxcrack.mesh.raw import RawMesh
@@ -54,7 +55,7 @@ _IN_STEPS = frozenset(
 _IN_MODEL = frozenset(
     (
         *("BOUNDARY", "INITIALCONDITIONS", "CONTACTPAIR", "TIE", "COUPLING", "KINEMATIC"),
-        *("DISTRIBUTING",),
+        *("DISTRIBUTING", "TRANSFORM"),
         *(
             "EQUATION",
             "MPC",
@@ -104,7 +105,6 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     flat = Flat(model, _order(model, report, order, explicit=explicit))
     if flat.kind.shell:
         check_normals(flat)
-    _warn_of_locking(flat, report, explicit=explicit)
     groups = Groups(flat)
     cards = _model_cards(flat)
     _check_steps(model.steps, explicit=explicit)
@@ -114,7 +114,11 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     boundary = Boundary(flat, periods)
     boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
     constraints = read_constraints(cards, flat)
-    loads = Loads(flat, amplitudes, report, finite=finite, carriers=constraints.carriers)
+    transforms = read_transforms(cards, flat)
+    loads = Loads(
+        flat, amplitudes, report,
+        finite=finite, carriers=constraints.carriers, transforms=transforms,
+    )  # fmt: skip
     temperatures = Temperatures(flat, report)
     temperatures.start(_initial(cards, "TEMPERATURE"))
     contacts = Contacts(
@@ -131,6 +135,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         temperatures.take(thermal, amplitudes, procedure.period)
         grow = contacts.take(number, of_step)
         steps.append(DeckStep(family.name, procedure.step, tuple(grow), grow))
+    warn_of_locking(flat, report, explicit=explicit, bonded=contacts.bonds_bodies)
     stresses = InitialStress(_initial(cards, "STRESS"), flat)
     if stresses.card is not None and temperatures.first is not None:
         stresses.card.fail("initial stresses beside temperatures are not available; leave one out")
@@ -143,18 +148,20 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
         check_density(moving[0], sections, model)
     if explicit:
         check_explicit(moving[0], flat, sections, boundary)
+    turned = turn_boundary(boundary, transforms, groups)
+    constraints.check_axes(transforms)
     if not explicit:
         contacts.share_supports(boundary)
-    constrained = constraints.supports(boundary, groups)
+    constrained = turned + constraints.supports(boundary, groups)
     if explicit:
-        check_constraints(constrained, cards)
+        check_constraints(constrained, cards, flat)
     supports = boundary.displacements(groups) + constrained
     held = np.unique(
         np.concatenate(
             [np.zeros(0, dtype=np.int64), *(n for d in range(3) for _, n in boundary.histories(d))]
         )
     )
-    debonds, bonds = contacts.build(model.interactions, held)
+    debonds, bonds = contacts.build(model.interactions, held, boundary)
     if explicit:
         titles = [d.interface.title for d in debonds]
         without = no_bulk_viscosity(flat, sections, finite=finite)
@@ -213,33 +220,6 @@ def _order(model: Model, report: Report, order: int | None, *, explicit: bool) -
         blocks[0].card,
     )
     return 2
-
-
-def _warn_of_locking(flat: Flat, report: Report, *, explicit: bool) -> None:
-    """Say what full integration of first-order elements costs in bending, and what avoids it."""
-    spaces = [flat.model.root, *flat.model.instances.values()]
-    blocks = [b for space in spaces for b in space.elements.values() if b.kind.bends_freely]
-    if not blocks or flat.kind.order != 1:
-        return
-    found = thickness_of(flat.kind.cell, flat.points, flat.cells)
-    known = ""
-    if found is not None:
-        elements = f"{found.number} element" + ("s" if found.number > 1 else "")
-        known = (
-            f": with {elements} over the smallest dimension of the bodies, {found.aspect:.3g} "
-            f"times as long as high, by about {100.0 * found.excess:.2g} % (rectangles, nu = 0.3)"
-        )
-    help_ = (
-        "explicit dynamics has no second order: mesh the thickness with more elements"
-        if explicit
-        else "--order 2 or read_deck(..., order=2) avoids it"
-    )
-    names = ", ".join(sorted({block.kind.name for block in blocks}))
-    report.replace(
-        f"first-order elements of full integration in place of {names} lock in bending, where "
-        f"they are too stiff{known}; {help_}",
-        blocks[0].card,
-    )
 
 
 def _model_cards(flat: Flat) -> list[Card]:

@@ -20,6 +20,8 @@ def drop_constrained(
     jumped: list[Bools],
     following: Following | None,
     layout: DofLayout,
+    *,
+    open_ones: bool = True,
 ) -> list[Bools]:
     """Take the jump from slave nodes that couplings and equations move; the same on every rank.
 
@@ -31,6 +33,7 @@ def drop_constrained(
         jumped: Per pair, the slave nodes that have a jump, shape (n_nodes,); changed in place.
         following: Dofs that follow others.
         layout: Unknowns of nodes and their numbers.
+        open_ones: Whether those that are not bonded lose theirs as well.
 
     Returns:
         Per pair, the bonded nodes whose jump a rigid set holds at zero, shape (n_nodes,).
@@ -45,6 +48,8 @@ def drop_constrained(
     for pair, has_jump, held in zip(pairs, jumped, rigid, strict=True):
         dofs = layout.dofs(pair.surface.dofs)
         touched = following.marks(dofs)[:, :gdim].any(axis=1) & has_jump
+        if not open_ones:
+            touched &= pair.bonded
         lost = 0
         for node in np.flatnonzero(touched):
             has_jump[node] = False

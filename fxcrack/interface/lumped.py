@@ -18,7 +18,8 @@ where T takes the motion of the nodes that follow nothing to that of all nodes a
 components count as infinite mass. Rows on a rigid surface have no masters: bonded ones rest, or
 slip along it (:mod:`fxcrack.interface.slipping_ties`). Where every slave has one master of its own,
 all of this is indexing; otherwise sparse products. Products for chosen rows are in
-:mod:`fxcrack.interface.lumped_rows`.
+:mod:`fxcrack.interface.lumped_rows`, couplings and equations, which T knows as well, in
+:mod:`fxcrack.interface.lumped_constraints`.
 """
 
 from __future__ import annotations
@@ -34,6 +35,8 @@ from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import InterfaceError
 from fxcrack.base.sparse import Product, by_component
 from fxcrack.continuum.dof_layout import DofLayout
+from fxcrack.interface.constrained_slaves import drop_constrained
+from fxcrack.interface.lumped_constraints import LumpedConstraints, SetAccelerations
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.rigid import RigidSurface
@@ -76,7 +79,9 @@ class LumpedInterface:
             twice, or interfaces form a cycle.
 
     Attributes:
-        nodes: The interface nodes; arrays below have one row for each of them.
+        nodes: The interface nodes, and those that couplings and equations move; arrays below have
+            one row for each of them.
+        constraints: Couplings and equations; ``None`` where there are none.
         mass: Their mass, shape (n_nodes,).
         pair: Pair of each row, shape (n_rows,).
         slave_node: Slave node of each row in its pair's surface, shape (n_rows,).
@@ -102,8 +107,11 @@ class LumpedInterface:
             |B_i/m B_j| over the rows j, shape (n_open, gdim).
         accelerations: Accelerations of the nodes by the forces on them, those that are prescribed
             zero; on components of the nodes, shape (n_nodes gdim, n_nodes gdim).
+        n_motions: Number of prescribed motions of references.
         version: How often ties, masses or frames have changed.
     """
+
+    accelerations: Product | SetAccelerations
 
     def __init__(
         self, layout: DofLayout, pairs: Sequence[Pair], supports: Supports, mass: Array,
@@ -114,10 +122,17 @@ class LumpedInterface:
         moving = [p for p, m in enumerate(masters) if m is not None]
         for p in moving:
             self.jumped[p] |= ~pairs[p].bonded  # they may come to a master later
+        following = supports.following
+        rigid = drop_constrained(pairs, self.jumped, following, layout, open_ones=False)
+        further = [pairs[p].surface.dofs for p in moving]
+        if following is not None:
+            further += [d // layout.n_unknowns for d in (following.dofs, following.masters)]
         self.nodes = nodes = InterfaceNodes.of_pairs(
             layout, pairs, [m for m in masters if isinstance(m, FacetSurface)], self.jumped,
-            _joined([pairs[p].surface.dofs for p in moving]),
+            _joined(further),
         )  # fmt: skip
+        self.constraints = None if following is None else LumpedConstraints(following, nodes)
+        self.n_motions = 0 if self.constraints is None else self.constraints.n_motions
         which, value = supports.at_nodes(nodes)
         self.which, self.value = which[:, :gdim], value[:, :gdim]
         check_slaves(pairs, self.jumped, nodes, which, value, supports)
@@ -127,6 +142,7 @@ class LumpedInterface:
             for p, j in zip(pairs, self.jumped, strict=True)
         ]
         frames, held = align_frames(list(pairs), at_slaves, self.jumped, supports, gdim)
+        held = [h | r[:, None] for h, r in zip(held, rigid, strict=True)]
         self.pair_frames, self.pair_held = frames, held
         counts = [int(j.sum()) for j in self.jumped]
         self.pair = np.repeat(np.arange(len(pairs)), counts)
@@ -188,6 +204,7 @@ class LumpedInterface:
             self.master is not None
             and len(np.unique(self.master)) == self.n_rows
             and not self.depth.any()
+            and self.constraints is None
         )
 
     def _depths(self) -> Ints:
@@ -235,12 +252,14 @@ class LumpedInterface:
             self.compliance = self.reach = np.asarray(both)
             self._accelerate_pairs()
             return
-        following = self.following
-        self.accelerations = Product(following @ sp.diags(self.inverse.ravel()) @ following.T)
-        motion = self._motion()
         self._jump = self.separations(self.open)
         self._jump_t = self._jump.T.tocsr()
-        self._root = sp.csr_matrix(self._jump @ motion)
+        following = self.following
+        if self.constraints is not None:
+            self._accelerate_sets(self.constraints)
+            return
+        self.accelerations = Product(following @ sp.diags(self.inverse.ravel()) @ following.T)
+        self._root = sp.csr_matrix(self._jump @ self._motion())
         self._root_t = self._root.T.tocsr()
         self.compliance = np.asarray(self._root.multiply(self._root) @ self.inverse)
         self._root.eliminate_zeros()
@@ -252,6 +271,48 @@ class LumpedInterface:
         loose = self.inverse.max(axis=1, initial=0.0)  # forces of any direction, unlike supports
         sums = size @ (loose * (size.T @ np.ones(len(self.open))))
         self.reach = np.repeat(np.asarray(sums)[:, None], self.which.shape[1], axis=1)
+
+    def _accelerate_sets(self, constraints: LumpedConstraints) -> None:
+        """Accelerations and compliances where couplings and equations move some components."""
+        gdim = self.which.shape[1]
+        mass, free = np.repeat(self.group_mass, gdim), (self.which < 0).ravel()
+        inverse = constraints.inverse(mass, free)
+        self._of_sets = SetAccelerations(constraints.motion, inverse)
+        motion = sp.csr_matrix(self.following @ constraints.motion)
+        self.accelerations = sets = SetAccelerations(motion, inverse)
+        jumps = by_component(self._jump, gdim)
+        self.compliance = self.reach = sets.diagonal_of(jumps).reshape(-1, gdim)
+        root = sp.csr_matrix(jumps @ motion)
+        root.eliminate_zeros()
+        if np.bincount(root.indices).max(initial=0) <= 1 and not sets.moves_sets(jumps):
+            return
+        self.separate = False
+        reach = sets.bound_of(jumps).reshape(-1, gdim).max(axis=1, initial=0.0)
+        self.reach = np.repeat(reach[:, None], gdim, axis=1)
+
+    def given_motion(self, components: Ints) -> sp.csr_matrix:
+        """What couplings and equations make of given motions, before slaves follow.
+
+        Args:
+            components: Components of the nodes whose motion is given, shape (m,).
+
+        Returns:
+            Shape (n_nodes gdim, m + n_motions), the motions of references last.
+        """
+        one = sp.identity(self.which.size, format="csc")
+        if self.constraints is None:
+            return sp.csr_matrix(one[:, components])
+        given = self.constraints.motion[:, components]
+        return sp.csr_matrix(sp.hstack([given, self.constraints.shares], format="csr"))
+
+    def given_accelerations(self, components: Ints) -> sp.csr_matrix:
+        """Accelerations of the nodes by given ones; arguments as for :meth:`given_motion`."""
+        given = self.given_motion(components)
+        if self.constraints is not None:
+            # what else belongs to a set moves as well, as its masses are connected
+            mass = sp.diags(np.repeat(self.group_mass, self.which.shape[1]))
+            given = given - self._of_sets.times(sp.csr_matrix(mass @ given))
+        return sp.csr_matrix(self.following @ given)
 
     def _accelerate_pairs(self) -> None:
         """Accelerations where every slave has one master of its own: both of a tied pair share."""
@@ -412,6 +473,9 @@ class LumpedInterface:
         """Acceleration of the open jumps by forces on all of them, shape (n_open, gdim)."""
         if self.simple:
             return np.asarray(self.compliance * forces)
+        if self.constraints is not None:
+            moved = self.accelerations(self.on_nodes(forces).ravel())
+            return self.jumps(moved.reshape(self.which.shape))
         return np.asarray(self._root @ (self.inverse * (self._root_t @ forces)))
 
 

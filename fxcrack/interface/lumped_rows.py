@@ -105,7 +105,7 @@ def pull_along(lumped: LumpedInterface, rows: Ints, directions: Array) -> tuple[
         height = directions.shape[1] * len(lumped.nodes)
         return Product.of_columns(columns, data, height), np.diag(own)
     along = _along(lumped, rows, directions)
-    push = sp.csr_matrix(lumped.accelerations.matrix() @ along.T)
+    push = lumped.accelerations.times(along.T)
     return Product(push), (along @ push).toarray()
 
 
@@ -121,7 +121,8 @@ def bonds_of(
 
     Returns:
         By the forces on the nodes, on components, shape (n gdim, n_nodes gdim); by the given
-        accelerations, shape (n gdim, m), ``None`` where there are none.
+        accelerations, those of the motions of references last, shape (n gdim, m + n_motions),
+        ``None`` where there are none.
     """
     gdim, s = lumped.which.shape[1], lumped.slave[rows]
     width = gdim * len(lumped.nodes)
@@ -140,8 +141,8 @@ def bonds_of(
     else:
         n = len(at)
         own = sp.csr_matrix((np.ones(n), at, np.arange(n + 1)), shape=(n, width))
-    force = mass @ lumped.accelerations.matrix()[at] - own
-    given = mass @ lumped.following[at][:, prescribed]
+    force = mass @ lumped.accelerations.rows(at) - own
+    given = mass @ lumped.given_accelerations(prescribed)[at]
     held = lumped.held[rows]
     if held.any():
         frames = lumped.frames[rows]

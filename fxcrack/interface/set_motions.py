@@ -14,6 +14,8 @@ from fxcrack.continuum.dof_layout import DofLayout
 
 FREE = 1e-9
 """Singular value of scaled motions below which they move no dof of the set, or are held."""
+_ROUND_OFF = 1e-12
+"""Distance from the reference below which there is none, over the largest coordinate."""
 _LARGE = 0.05
 """Rotation in radians from which it is said that rotations of couplings are small ones: the nodes
 are off by half its square, 0.1 %, of their distance from the reference."""
@@ -42,6 +44,9 @@ def coupled_motions(
     r = np.zeros((len(x), 3))
     r[:, :gdim] = x[:, :gdim]
     r[:, : len(coupling.point)] -= np.asarray(coupling.point)
+    # a node at the reference has no lever: one of round-off would let rotations move it
+    size = max(np.abs(x).max(initial=0.0), np.abs(coupling.point).max())
+    r[np.abs(r) <= _ROUND_OFF * size] = 0.0
     axes = np.eye(3)
     turns = [np.cross(axes[i], r) for i in (range(3) if gdim == 3 else (2,))]
     parts, unknowns = [], []

@@ -255,9 +255,11 @@ class ExplicitSolver:
         u = self.bodies.u.x.array
         fixed = np.flatnonzero(self.supports.which >= 0)
         u[fixed] = self.supports.value[fixed] * coordinates[self.supports.which[fixed]]
-        self.bodies.u.x.scatter_forward()
         self.dynamics.u = self._at_points(u[: self.continuum.n_local])
-        self.lumped.follow(self.dynamics.v)
+        self.dynamics.begin(coordinates[: len(self.supports.columns)])
+        u[self._at_interface] = self.dynamics.u[self._mine].ravel()
+        self._velocity[self._at_interface] = self.dynamics.v[self._mine].ravel()
+        self.bodies.u.x.scatter_forward()
         self._outer.factors = coordinates[len(self.supports.columns) :]
         self.bodies.begin(self.at)
         self.energies.heated = self._accounts.thermal_part(*self._middle())
@@ -335,7 +337,7 @@ class ExplicitSolver:
         whole = outer.exist or dt != self.last_dt
         v = self.velocity if whole else self._velocity
         before = v.copy() if whole else v
-        old = prescribed.motion(v, dynamics.v)
+        old = prescribed.velocity(v, dynamics)
         elastic = None
         if dynamics.elastic.exist and dt != self.last_dt:
             elastic = dynamics.v.copy(), dynamics.gap
@@ -349,7 +351,7 @@ class ExplicitSolver:
         # what neighbours need is on its way during the product
         self._ghosts.start(v, dt, dynamics.u[mine])
         self.motion.change_others(v)
-        power = float(reactions @ (old + prescribed.motion(v, dynamics.v)))
+        power = float(reactions @ (old + prescribed.velocity(v, dynamics)))
         if whole:
             power += outer.power(before, v, h)
         self.energies.work += 0.5 * h * power

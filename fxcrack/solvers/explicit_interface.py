@@ -67,6 +67,8 @@ class InterfaceDynamics:
     Attributes:
         fading: Bond forces that fall with time.
         energies: What has left the bodies through the interfaces.
+        references: Prescribed motions of references, of their displacement and velocity rows as of
+            the nodes, shape (2, n_motions).
         open_pairs: Contact and friction of the pairs that are not tied.
     """
 
@@ -89,6 +91,8 @@ class InterfaceDynamics:
         self._fixed = np.flatnonzero(lumped.which.ravel() >= 0)
         self._fixed_column = lumped.which.ravel()[self._fixed]
         self._fixed_value = lumped.value.ravel()[self._fixed]
+        self.references = np.zeros((2, lumped.n_motions))
+        self._target = np.zeros(lumped.n_motions)
         self._h = self._dt = 1.0
         self._acting = ActingForces()
         self.set_ties(tied)
@@ -154,8 +158,9 @@ class InterfaceDynamics:
         """Tie some rows, shape (n_rows,), and prepare what depends on that."""
         lumped = self.lumped
         lumped.set_ties(tied)
-        if len(self._fixed):
-            self._fixed_push = Product(lumped.following[:, self._fixed])
+        self._any_given = bool(len(self._fixed) or lumped.n_motions)
+        if self._any_given:
+            self._given_push = Product(lumped.given_accelerations(self._fixed))
         self.set_frames()
 
     def set_frames(self) -> None:
@@ -246,8 +251,8 @@ class InterfaceDynamics:
         Args:
             forces: On the nodes, without those of interfaces, shape (n_nodes gdim,), force; kept
                 until the next call.
-            coordinates: Prescribed displacements of the support columns at the end, shape
-                (n_columns,).
+            coordinates: Prescribed displacements of the support columns at the end, those of
+                references last, shape (n_columns,).
             h: Time from the last velocity to the next, time.
             dt: Increment, time.
         """
@@ -256,10 +261,15 @@ class InterfaceDynamics:
             forces = forces + self.elastic_forces().ravel()
         self._forces, self._more, self._h, self._dt = forces, None, h, dt
         a = lumped.accelerations.into(forces, self._a)
-        if len(self._fixed):
+        if self._any_given:
             target = self._fixed_value * coordinates[self._fixed_column]
             self._given = ((target - self._u[self._fixed]) / dt - self._v[self._fixed]) / h
-            self._fixed_push.add(self._given, a)
+            if lumped.n_motions:
+                self._target = coordinates[len(coordinates) - lumped.n_motions :]
+                q, rate = self.references
+                given = ((self._target - q) / dt - rate) / h
+                self._given = np.concatenate([self._given, given])
+            self._given_push.add(self._given, a)
         x, y = self._free_motion()
         self._acting = acting = ActingForces()
         if not len(lumped.open):
@@ -320,6 +330,8 @@ class InterfaceDynamics:
             self.energies.bonds += live.follow(acting.softening, self._u, self._v, self._y, h, dt)
         self._u, self._x = self._x, self._u
         self._v, self._y = self._y, self._v
+        if self.lumped.n_motions:
+            self.references = np.array([self._target, (self._target - self.references[0]) / dt])
         if self.fading:
             self.fading = older(self.fading, dt)
         if acting.softening is not None:
@@ -346,6 +358,23 @@ class InterfaceDynamics:
         if chosen.by_motion is not None:
             chosen.by_motion.add(self._given, out)
         return out
+
+    def begin(self, coordinates: Array) -> None:
+        """Take the displacement of the start: couplings and equations hold there.
+
+        Args:
+            coordinates: Of the support columns, those of references last, shape (n_columns,).
+        """
+        lumped = self.lumped
+        constraints = lumped.constraints
+        if constraints is not None:
+            self.references[0] = coordinates[len(coordinates) - lumped.n_motions :]
+            self._u[:] = constraints.displaced(self._u, self.references[0])
+            moved = constraints.involved
+            # of velocities that contradict them the momentum is kept
+            momentum = np.repeat(lumped.mass, self._shape[1]) * self._v
+            self._v[moved] = lumped.accelerations(momentum)[moved]
+        lumped.follow(self.v)
 
     def moved(self, product: Product) -> Array:
         """A product with the present displacement of the nodes, shape (n,)."""

@@ -35,6 +35,7 @@ class InterfaceSnapshot:
         bonds: Softening bonds.
         fading: Bonds that fade.
         energies: What has left the bodies.
+        references: Displacement and velocity of prescribed references, shape (2, n_motions).
     """
 
     tied: Bools
@@ -42,6 +43,7 @@ class InterfaceSnapshot:
     bonds: SofteningBonds
     fading: list[Fading]
     energies: InterfaceEnergies
+    references: Array
 
     @classmethod
     def of(cls, dynamics: InterfaceDynamics) -> InterfaceSnapshot:
@@ -50,7 +52,7 @@ class InterfaceSnapshot:
         copied = {f.name: getattr(bonds, f.name).copy() for f in fields(bonds)}
         return cls(
             dynamics.lumped.tied.copy(), dynamics.elastic.active.copy(), SofteningBonds(**copied),
-            list(dynamics.fading), replace(dynamics.energies),
+            list(dynamics.fading), replace(dynamics.energies), dynamics.references.copy(),
         )  # fmt: skip
 
     def restore(self, dynamics: InterfaceDynamics) -> None:
@@ -60,11 +62,13 @@ class InterfaceSnapshot:
         dynamics.fading = list(self.fading)
         dynamics.energies = replace(self.energies)
         dynamics.elastic.active = self.elastic.copy()
+        dynamics.references = self.references.copy()
         dynamics.set_ties(self.tied)
 
     def arrays(self) -> Arrays:
         """Plain arrays by name: those of the bonds, rows and forces of fading ones, energies."""
         out: Arrays = {"tied": self.tied, "elastic": self.elastic}
+        out["references"] = self.references
         out |= {f"bonds.{f.name}": getattr(self.bonds, f.name) for f in fields(self.bonds)}
         out["energies"] = np.array(list(asdict(self.energies).values()))
         gdim = self.bonds.direction.shape[1]
@@ -92,7 +96,9 @@ class InterfaceSnapshot:
         ]
         energies = InterfaceEnergies(*arrays["energies"].astype(float).tolist())
         tied, elastic = (arrays[name].astype(bool) for name in ("tied", "elastic"))
-        return cls(tied, elastic, bonds, fading, energies)
+        # checkpoints written before there were couplings have none
+        references = np.asarray(arrays.get("references", np.zeros((2, 0))), dtype=float)
+        return cls(tied, elastic, bonds, fading, energies, references)
 
 
 @dataclass(frozen=True)

@@ -11,13 +11,14 @@ from __future__ import annotations
 import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.sparse import Product
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
 
 
 class PrescribedMotion:
-    """The prescribed dofs of this rank: first those within the bodies, then those at interfaces.
+    """The prescribed dofs of this rank: those within the bodies, at interfaces, of references.
 
     Args:
         supports: Prescribed components.
@@ -28,7 +29,7 @@ class PrescribedMotion:
         dofs: Those within the bodies, shape (n_dofs,).
         columns: Support column of all of them, shape (n_prescribed,).
         values: Entry of the column, shape (n_prescribed,).
-        holds_nodes: Whether any of them are at interfaces.
+        holds_nodes: Whether any of them are at interfaces, or of references.
     """
 
     def __init__(self, supports: Supports, lumped: LumpedInterface, at_interface: Ints) -> None:
@@ -39,9 +40,19 @@ class PrescribedMotion:
         mine = np.zeros((len(lumped.nodes), 1), dtype=bool)
         mine[lumped.nodes.mine] = True
         self._nodes = np.nonzero((lumped.which >= 0) & mine)
-        self.holds_nodes = bool(len(self._nodes[0]))
-        self.columns = np.concatenate([self._column, lumped.which[self._nodes]]).astype(np.int64)
-        self.values = np.concatenate([self._value, lumped.value[self._nodes]])
+        self._gives: Product | None = None
+        # references belong to no rank; the first one counts their work
+        self._n_motions = lumped.n_motions if lumped.nodes.layout.comm.rank == 0 else 0
+        self.holds_nodes = bool(len(self._nodes[0]) or self._n_motions)
+        motions = len(supports.columns) - lumped.n_motions + np.arange(self._n_motions)
+        columns = [self._column, lumped.which[self._nodes], motions]
+        self.columns = np.concatenate(columns).astype(np.int64)
+        if lumped.constraints is not None:
+            at = lumped.which.shape[1] * self._nodes[0] + self._nodes[1]
+            given = lumped.given_motion(at)[:, : len(at) + self._n_motions]
+            self._gives = Product(given.T)
+        ones = np.ones(self._n_motions)
+        self.values = np.concatenate([self._value, lumped.value[self._nodes], ones])
 
     def velocities(self, u: Array, coordinates: Array, dt: float) -> Array:
         """Velocities of :attr:`dofs` that lead to the prescribed displacement, shape (n_dofs,).
@@ -53,19 +64,26 @@ class PrescribedMotion:
         """
         return np.asarray((self._value * coordinates[self._column] - u[self.dofs]) / dt)
 
-    def motion(self, owned: Array, nodes: Array) -> Array:
-        """A motion at all prescribed dofs, shape (n_prescribed,).
+    def velocity(self, owned: Array, dynamics: InterfaceDynamics) -> Array:
+        """The velocity at all prescribed dofs, shape (n_prescribed,), length/time.
 
         Args:
             owned: Of the owned dofs, shape (n_local,).
-            nodes: Of the interface nodes, shape (n_nodes, gdim).
+            dynamics: Motion of the interface nodes and of references.
         """
         within = owned[self.dofs]
-        return np.concatenate([within, nodes[self._nodes]]) if self.holds_nodes else within
+        if not self.holds_nodes:
+            return within
+        motions = dynamics.references[1, : self._n_motions]
+        return np.concatenate([within, dynamics.v[self._nodes], motions])
 
     def at_nodes(self, lumped: LumpedInterface, dynamics: InterfaceDynamics) -> Array:
-        """Reactions at interface nodes, shape (n_prescribed - n_dofs,), force."""
+        """Reactions at interface nodes and references, shape (n_prescribed - n_dofs,), force."""
         node = self._nodes[0]
+        if self._gives is not None:
+            wanted = lumped.group_mass[:, None] * dynamics.a - dynamics.total
+            wanted[lumped.slave[lumped.tied & ~lumped.rigid]] = 0.0
+            return self._gives(wanted.ravel())
         if not len(node):
             return np.zeros(0)
         needed = lumped.group_mass[node] * dynamics.a[self._nodes]

@@ -131,17 +131,17 @@ def check_start(continuum: Continuum, interfaces: Sequence[Interface]) -> None:
             )
 
 
-def check_constraints(constraints: Sequence[Constraint]) -> None:
-    """Refuse couplings and equations, which lumped masses do not know.
+def check_constraints(continuum: Continuum, constraints: Sequence[Constraint]) -> None:
+    """Refuse couplings and equations of shells, whose faces and directors have other masses.
 
     Raises:
         InputError: There is one.
     """
-    if constraints:
+    if constraints and isinstance(continuum, ShellBodies):
         raise InputError(
-            f"Explicit: couplings and equations ('{constraints[0].title}') are not available in "
-            "explicit dynamics; prescribe the displacements of the nodes by Displacement, or load "
-            "them by PointForce"
+            f"Explicit: couplings and equations ('{constraints[0].title}') of shells on surface "
+            "meshes are not available in explicit dynamics; prescribe the displacements of the "
+            "nodes by Displacement, or load them by PointForce"
         )
 
 

@@ -44,7 +44,7 @@ def use_explicit_solver(analysis: Analysis, terms: Callable[[Continuum], Sequenc
         )
     interfaces = [pair.interface for pair in analysis.pairs]
     check_bodies(analysis.continuum, old.loads, interfaces)
-    check_constraints(old.supports.constraints)
+    check_constraints(analysis.continuum, old.supports.constraints)
     found = terms(analysis.continuum)
     check_large_rotation(analysis.continuum, interfaces, found)
     heat: list[Any] = []

@@ -1,0 +1,141 @@
+"""What of a deck plays no part in what is computed: it is left out and said so.
+
+* Materials and interactions that nothing names, whatever they hold.
+* Steps of perturbation (frequencies, buckling loads) beside general ones: the other steps begin and
+  end as if they were not there.
+* Point masses in a static deck without gravity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fxcrack.deck.cards import Card, key, squeeze
+from fxcrack.deck.keywords import KEYWORDS
+from fxcrack.deck.report import Report
+
+OF_MATERIALS = ("ELASTIC", "PLASTIC", "EXPANSION", "DENSITY", "HYPERELASTIC", "DAMPING")
+OF_INTERACTIONS = ("FRICTION", "SURFACEBEHAVIOR", "COHESIVEBEHAVIOR", "FRACTURECRITERION")
+_PERTURBATIONS = frozenset(
+    (
+        *("FREQUENCY", "BUCKLE", "COMPLEXFREQUENCY", "STEADYSTATEDYNAMICS", "MODALDYNAMIC"),
+        *("RANDOMRESPONSE", "RESPONSESPECTRUM", "SUBSTRUCTUREGENERATE"),
+    )
+)
+_GENERAL = frozenset(("STATIC", "VISCO", "DYNAMIC", "DIRECTCYCLIC", "FATIGUE"))
+_POINT_MASSES = ("MASS", "ROTARYI", "ROTARYINERTIA")
+
+
+def without_unused(cards: Sequence[Card], report: Report) -> list[Card]:
+    """The cards of a deck without those that play no part.
+
+    Args:
+        cards: In order.
+        report: Takes what is left out.
+    """
+    kept = _families(cards, report, "MATERIAL", OF_MATERIALS, _named_materials(cards))
+    kept = _families(
+        kept, report, "SURFACEINTERACTION", OF_INTERACTIONS, _named_interactions(cards)
+    )
+    return _point_masses(_perturbations(kept, report), report)
+
+
+def _named_materials(cards: Sequence[Card]) -> set[str]:
+    """Keys of the materials that sections name."""
+    found = {key(card.options["MATERIAL"] or "") for card in cards if card.has("MATERIAL")}
+    for card in cards:
+        if card.has("COMPOSITE"):
+            found |= {key(row.text(2)) for row in card.rows()}
+    return found
+
+
+def _named_interactions(cards: Sequence[Card]) -> set[str]:
+    """Keys of the interactions that pairs name."""
+    found = {key(card.options["INTERACTION"] or "") for card in cards if card.has("INTERACTION")}
+    for card in cards:
+        if card.keyword == "CONTACTPROPERTYASSIGNMENT":
+            found |= {key(row.text(2)) for row in card.rows()}
+    return found
+
+
+def _families(
+    cards: Sequence[Card], report: Report, head: str, members: Sequence[str], named: set[str]
+) -> list[Card]:
+    """The cards without the families of a head that nothing names.
+
+    To a family belong its members and all that fxcrack refuses or does not know, up to the next
+    card that belongs elsewhere.
+    """
+    kept: list[Card] = []
+    inside, seen = False, set()
+    for card in cards:
+        if card.keyword == head:
+            name = key(card.options.get("NAME") or "")
+            inside = bool(name) and name not in named and name not in seen
+            seen.add(name)
+            if inside:
+                what = "material" if head == "MATERIAL" else "surface interaction"
+                report.leave(f"{what} '{card.text('NAME')}', which nothing in the deck names")
+        elif inside:
+            known = KEYWORDS.get(card.keyword)
+            elsewhere = known is not None and known.kind in ("read", "output")
+            inside = card.keyword in members or not elsewhere
+        if not inside:
+            kept.append(card)
+    return kept
+
+
+def _perturbations(cards: Sequence[Card], report: Report) -> list[Card]:
+    """The cards without steps of perturbation, if there are general steps beside them."""
+    steps: list[list[Card]] = []
+    for card in cards:
+        if card.keyword == "STEP":
+            steps.append([])
+        if steps:
+            steps[-1].append(card)
+    perturbing = [
+        step
+        for step in steps
+        if any(c.keyword in _PERTURBATIONS for c in step)
+        or (step[0].has("PERTURBATION") and any(c.keyword in _GENERAL for c in step))
+    ]
+    if not perturbing or len(perturbing) == len(steps):
+        return list(cards)
+    for step in perturbing:
+        name = step[0].options.get("NAME") or f"step {1 + steps.index(step)}"
+        report.replace(
+            f"the linear perturbation step '{name}' is left out: it changes nothing of the other "
+            "steps",
+            step[0],
+        )
+    out = {id(card) for step in perturbing for card in step}
+    return [card for card in cards if id(card) not in out]
+
+
+def _point_masses(cards: Sequence[Card], report: Report) -> list[Card]:
+    """The cards without point masses, where nothing accelerates them."""
+
+    def accelerates(card: Card) -> bool:
+        loads = ("GRAV", "CENTRIF", "CENT", "ROTA")
+        return card.keyword == "DYNAMIC" or (
+            card.keyword == "DLOAD" and any(squeeze(row.text(1)) in loads for row in card.rows())
+        )
+
+    if any(accelerates(card) for card in cards):
+        return list(cards)
+    kept: list[Card] = []
+    for card in cards:
+        if card.keyword in _POINT_MASSES:
+            report.replace(
+                "point masses play no part in static steps without gravity; left out", card
+            )
+        elif card.keyword == "ELEMENT" and card.word("TYPE") in _POINT_MASSES:
+            if card.has("ELSET"):  # other cards may name the set
+                name = {"ELSET": card.options["ELSET"]}
+                kept.append(Card("ELSET", "*ELSET", name, card.file, card.line))
+        else:
+            kept.append(card)
+    return kept
+
+
+__all__ = ["OF_INTERACTIONS", "OF_MATERIALS", "without_unused"]

@@ -1,0 +1,110 @@
+"""What decks hold that plays no part in what is computed, and cards without data."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import fxcrack as fx
+from fxcrack.deck.cards import DeckError
+from tests.decks import BONDED, OPENED, PLATE, STEP, VCCT, read, write
+
+
+def test_materials_and_interactions_that_nothing_names(tmp_path):
+    unused = (
+        "*MATERIAL, NAME=USER\n*DEPVAR\n3\n*USER MATERIAL, CONSTANTS=1\n1.\n*MYSTERY\n"
+        "*SURFACE INTERACTION, NAME=J\n*COHESIVE BEHAVIOR\n*DAMAGE INITIATION, CRITERION=MAXS\n1.\n"
+    )
+    text = BONDED.replace("*CONTACT PAIR", unused + "*CONTACT PAIR")
+    report = read(tmp_path, text + OPENED.format(criterion=VCCT)).report
+    assert [name for name in report.ignored if "nothing in the deck names" in name] == [
+        "material 'USER', which nothing in the deck names",
+        "surface interaction 'J', which nothing in the deck names",
+    ]
+    named = text.replace("INTERACTION=I\nT", "INTERACTION=J\nT")
+    with pytest.raises(DeckError, match="DAMAGE INITIATION is refused"):
+        read(tmp_path, named + OPENED.format(criterion=VCCT))
+    with pytest.raises(DeckError, match="DEPVAR is refused"):
+        read(tmp_path, text.replace("MATERIAL=M", "MATERIAL=USER") + OPENED.format(criterion=VCCT))
+
+
+def test_perturbation_steps_beside_others(tmp_path):
+    frequency = "*STEP, NAME=MODES, PERTURBATION\n*FREQUENCY\n5\n*BOUNDARY\nLEFT, 2\n*END STEP\n"
+    found = read(tmp_path, PLATE + STEP + frequency + STEP)
+    assert [step.name for step in found.steps] == ["step 1", "step 2"]
+    assert any("'MODES' is left out" in line for line in found.report.replaced)
+    alone = STEP.replace("*STEP", "*STEP, PERTURBATION, NLGEOM")
+    (step,) = read(tmp_path, PLATE + alone).steps
+    assert isinstance(step.step, fx.Static)
+    assert not read(tmp_path, PLATE + alone).arguments["effects"]  # it is linear
+
+
+def test_point_masses_in_static_steps(tmp_path):
+    mass = "*ELEMENT, TYPE=MASS, ELSET=POINT\n9, 6\n*MASS, ELSET=POINT\n1.\n"
+    found = read(tmp_path, PLATE + mass + STEP)
+    assert sum("point masses play no part" in line for line in found.report.replaced) == 1
+    heavy = STEP.replace("*END STEP", "*DLOAD\n, GRAV, 9.81, 0., -1., 0.\n*END STEP")
+    with pytest.raises(DeckError, match="MASS is refused"):
+        read(tmp_path, PLATE + mass + heavy)
+
+
+def test_op_new_without_data_takes_all_away(tmp_path):
+    first = STEP.replace("*END STEP", "*CLOAD\n6, 2, 1.\n*END STEP")
+    second = "*STEP\n*STATIC\n0.5, 1.\n*CLOAD, OP=NEW\n*TEMPERATURE, OP=NEW\n*END STEP\n"
+    (load,) = read(tmp_path, PLATE + first + second).arguments["loads"]
+    assert load.amplitude(1.0) * load.value[1] == 1.0 and load.amplitude(2.0) == 0.0
+    with pytest.raises(DeckError, match="there is no data line"):
+        read(tmp_path, PLATE + first + second.replace(", OP=NEW", ""))
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+def test_rotation_of_a_body(shared_path):
+    """The support of a plate that spins about its edge carries rho omega^2 int x dV."""
+    text = PLATE + "*DENSITY\n3.\n"
+    step = "*STEP\n*STATIC\n1., 1.\n*BOUNDARY\nLEFT, 1\n1, 2\n*DLOAD\n{}\n*END STEP\n"
+    for line, expected in (
+        ("PLATE, CENTRIF, 4., 0., 0., 0., 0., 1., 0.", 3.0 * 4.0 * 4.0),
+        (", CENT, 5., 0.5, 0., 0., 0., 1., 0.", 5.0 * 2.0),  # int (x - 0.5) dV = 2
+    ):
+        deck = fx.read_deck(write(shared_path, text + step.format(line)))
+        # constant strains of the mean: linear elements integrate the force exactly
+        assert deck.run()["R[LEFT.x]"][-1] == pytest.approx(-expected, rel=1e-12)
+        deck.scene.close()
+
+
+def test_axis_of_rotation_in_a_plane(tmp_path):
+    text = PLATE + "*DENSITY\n3.\n"
+    step = "*STEP\n*STATIC\n*DLOAD\n{}\n*END STEP\n"
+    (spin,) = read(tmp_path, text + step.format(", CENT, 2.")).arguments["loads"]
+    x = np.array([[1.0], [2.0], [0.0]])  # in a plane the axis is z
+    assert [f(x)[0] for f in spin.value] == [2.0, 4.0]
+
+
+def test_slave_nodes_beyond_the_tolerance_are_not_tied(tmp_path, caplog):
+    """Half of the upper bar hangs over the lower one: its nodes there are free."""
+    tied = BONDED[: BONDED.index("*CONTACT PAIR")] + "*TIE, NAME=T\nTOP, BOTTOM\n"
+    short = tied.replace("13, 23, 24, 34, 33\n14, 24, 25, 35, 34\n", "")
+    step = "*STEP\n*STATIC\n*BOUNDARY\n11, 1, 2\n*END STEP\n"
+    found = read(tmp_path, short + step)
+    (interface,) = found.arguments["bonds"]
+    assert "2 of 5 slave nodes of 'TOP' lie beyond the tolerance" in caplog.text
+    x = found.raw.points[found.raw.groups[interface.bonded].rows[:, 0]]
+    assert np.array_equal(np.sort(x[:, 0]), [0.0, 1.0, 2.0])
+    whole = read(tmp_path, tied + step).arguments["bonds"][0].bonded
+    assert whole(np.zeros((3, 4))).all()
+    far = tied.replace("0., 1.\n32, 1., 1.", "0., 1.\n32, 1., 0.9")
+    for n in (31, 33, 34, 35):
+        far = far.replace(f"\n{n}, {n - 31}., 1.", f"\n{n}, {n - 31}., 0.7")
+    with pytest.raises(DeckError, match="no slave node lies within the tolerance"):
+        read(tmp_path, far.replace("32, 1., 0.9", "32, 1., 0.7") + step)
+
+
+def test_bonded_bodies_that_lock_are_told_how_much(tmp_path):
+    """Square elements, one over the thickness: 48 % (Cook et al., 4th ed., section 3.6)."""
+    text = BONDED + OPENED.format(criterion=VCCT)
+    (line,) = read(tmp_path, text).report.doubts
+    assert "(CPE4) lock in bending, in any program" in line and "by about 48 %" in line
+    assert not read(tmp_path, PLATE + STEP).report.doubts  # nothing is bonded
+    path = write(tmp_path, text)
+    assert not fx.read_deck(path, order=2).report.doubts
