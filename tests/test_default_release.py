@@ -18,6 +18,7 @@ from fxcrack.steps.release_choice import choose_release
 STEEL = fx.Isotropic(70e3, 0.3)
 EVENT = fx.Static(until=fx.Releases(1))
 OPENING = fx.Static(until=fx.Releases(1), stepping="opening", opening="top")
+INCREMENTS = fx.Static(until=fx.Releases(1), stepping="increment")
 PROGRESSIVE, STEP = fx.ProgressiveRelease(), fx.StepRelease()
 
 
@@ -53,6 +54,7 @@ def arms(
 
 def test_where_progressive_release_is_the_default() -> None:
     by_closure, by_domain = (fx.VCCT(1.0, method=m) for m in ("closure", "domain"))
+    runs_on = fx.VCCT(1.0, unstable_tolerance=np.inf)
     dynamic = fx.Dynamic(until=fx.Time(1.0), dt=1.0)
     explicit = fx.Explicit(until=fx.Time(1.0))
     wanted = [
@@ -65,6 +67,13 @@ def test_where_progressive_release_is_the_default() -> None:
         ("3-D", {"criterion": by_domain}, EVENT, STEP, "method='domain'"),
         ("3-D", {"watch": [by_domain]}, EVENT, STEP, "method='domain'"),
         ("3-D", {}, OPENING, STEP, "stepping='opening'"),
+        ("3-D", {}, INCREMENTS, PROGRESSIVE, ""),
+        ("3-D", {"criterion": runs_on}, EVENT, PROGRESSIVE, ""),
+        ("3-D", {"criterion": runs_on}, dynamic, PROGRESSIVE, ""),
+        (
+            *("3-D", {"criterion": runs_on}, INCREMENTS),
+            *(STEP, "unstable_tolerance in stepping='increment'"),
+        ),
         ("friction", {}, EVENT, STEP, "friction (interface 'bond')"),
         ("friction", {}, explicit, PROGRESSIVE, ""),
         ("plane", {}, EVENT, STEP, ""),

@@ -16,7 +16,7 @@ from fxcrack.interface.pair import Pair
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.static import Static
+from fxcrack.steps.static import Dynamic, Static
 
 Step = Static | Cycles | Explicit
 
@@ -73,6 +73,12 @@ def _why_at_once(debond: Debond, step: Step, pairs: Sequence[Pair]) -> str:
         return "onset by method='closure'"
     if isinstance(step, Static) and step.stepping == "opening":
         return "stepping='opening'"
+    statics = isinstance(step, Static) and not isinstance(step, Dynamic)
+    at_any_f = debond.criterion.unstable_tolerance is not None
+    if at_any_f and statics and step.stepping == "increment":
+        # a bond that softens sheds its load as the load grows on, so that a front advances by a
+        # row per increment at most, at any f that is allowed; bonds that go at once catch up
+        return "unstable_tolerance in stepping='increment'"
     return ""
 
 
