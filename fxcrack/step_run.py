@@ -25,6 +25,7 @@ from fxcrack.restart.checkpoint import Checkpoint
 from fxcrack.restart.manager import RestartManager, RunFiles
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.linear import LinearSolver
+from fxcrack.solvers.second_order_effects import warn_of_second_order
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.cycles import Cycles, check_criteria
 from fxcrack.steps.cyclic import run_cycles
@@ -166,11 +167,15 @@ def run_step(
     analysis.history.details = _details(analysis)
     if isinstance(analysis.solver, LinearSolver) and not isinstance(step, Explicit):
         # not worth a factorisation of its own, which a direct solver needs on several ranks
-        known = analysis.solver.recovers_displacement
-        if known and not isinstance(analysis.continuum, ShellBodies):
+        if analysis.solver.recovers_displacement:
             u = analysis.solver.displacement()
-            warn_of_range(analysis.continuum, u.array_r.copy(), analysis.said)
+            now = u.array_r.copy()
             u.destroy()
+            if not isinstance(analysis.continuum, ShellBodies):
+                warn_of_range(analysis.continuum, now, analysis.said)
+            if analysis.continuum.temperature is not None:
+                analysis.continuum.temperature.set(analysis.time)
+            warn_of_second_order(analysis.solver, now, analysis.said)
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
         u = analysis.solver.displacement()

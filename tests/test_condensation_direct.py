@@ -24,6 +24,8 @@ from fxcrack.condensation.mumps_schur import (
     mumps_message,
 )
 from fxcrack.mesh import Mesh
+from fxcrack.meshes.blocks import build
+from fxcrack.meshes.bodies import two_bodies
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 
 Array = npt.NDArray[np.float64]
@@ -304,3 +306,35 @@ def test_gathered_matrix() -> None:
     """The helper the oracles rest on."""
     matrix, whole, _ = grid_matrix(MPI.COMM_SELF, 5, np.arange(3))
     assert (gathered(matrix) != whole).nnz == 0
+
+
+@pytest.mark.three
+@pytest.mark.mpi
+@pytest.mark.parametrize("solver", ["linear", "newton"])
+def test_no_displacement_is_left_to_eliminate(comm: MPI.Intracomm, solver: str) -> None:
+    """Supports hold all of one body, and jumps are all there is of the other."""
+    model, _, lower = two_bodies(
+        (np.linspace(0.0, 4.0, 5), np.linspace(0.0, 4.0, 5)),
+        (np.linspace(0.0, 1.0, 2), np.linspace(-1.0, 0.0, 2)),
+        cell="quadrilateral",
+        order=1,
+    )
+    model.group("base", lower.part(y=-1.0))
+    bond = fx.Interface("upper_face", "lower_face", bonded=lambda x: x[0] >= 2.0, contact=True)
+    still = {"x": 0.0, "y": 0.0}
+    scene = fx.Scene(
+        build(comm, "held", lambda: model),
+        materials=fx.Isotropic(E=50.0, nu=0.0),
+        model=fx.PlaneStrain(),
+        supports=[
+            *(fx.Displacement(name, **still) for name in ("base", "lower_face")),
+            fx.Displacement("top", x=0.0, y=-0.1),
+        ],
+        bonds=[bond],
+        solver=solver,
+    )
+    row = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)[-1]
+    assert scene.solver.system.n_retained > 0
+    # uniform compression by a tenth, without a strain across it
+    assert row["R[top.y]"] == pytest.approx(-50.0 * 0.1 * 4.0, rel=1e-12)
+    assert row["strain_energy"] == pytest.approx(0.5 * 50.0 * 0.1**2 * 4.0, rel=1e-12)

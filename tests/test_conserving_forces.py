@@ -5,9 +5,11 @@ from __future__ import annotations
 from bodies import MODELS, box, solve, wavy
 
 from fxcrack.base import compat  # noqa: F401  isort: skip  (orders MPI before DOLFINx)
+import dolfinx.fem
 import numpy as np
 import numpy.typing as npt
 import pytest
+import ufl
 from mpi4py import MPI
 from test_continuum_shell import shell
 from thin_bodies import thin_body
@@ -182,3 +184,64 @@ def test_a_state_that_was_restored_goes_on_alike(comm: MPI.Intracomm) -> None:
         bodies.destroy()
     assert ends[1][0] == pytest.approx(ends[0][0], abs=1e-13)
     assert ends[1][1] == pytest.approx(ends[0][1], rel=1e-9)
+
+
+WARM = {
+    "plane strain": fx.Orthotropic(
+        E=(140.0, 10.0, 9.0), nu=(0.3, 0.25, 0.4), G=(5.0, 5.0, 3.5),
+        frame=((1, 0.5, 0), (0, 1, 0)), expansion=(-1e-4, 2e-3, 3e-3),
+    ),
+    "plane stress": fx.ByTemperature(
+        {0.0: fx.Isotropic(100.0, 0.3, 1e-3), 200.0: fx.Isotropic(60.0, 0.35, 2e-3)}
+    ),
+    "ring": fx.NeoHookean(100.0, 0.3, expansion=2e-3),
+}  # fmt: skip
+
+
+def over_time(continuum: Continuum, term: Term, along: Array, time: float) -> tuple[float, ...]:
+    """Work of forces and temperature in one increment from rest at time 0, and energy gained."""
+    increment = Increment(continuum, term, KEEPS, np.zeros_like(along))
+    whole = increment.term
+    whole.begin(time, time)
+    step = time * along
+    last = increment.forces(step)
+    given = 0.5 * (increment.first + last) @ step
+    increment.energy(step)
+    whole.commit(increment._u)
+    return given, whole.work(), increment.energy(step) - increment.before
+
+
+def along_the_way(continuum: Continuum, term: Term, along: Array, time: float) -> float:
+    """Work of the temperature on the straight way there: integral of dW/dT dT."""
+    field = continuum.temperature
+    assert field is not None
+    u, change = wavy(continuum, 0.0, 0), dolfinx.fem.Function(field.rise.function_space)
+    power = dolfinx.fem.form(ufl.derivative(term.energy(u), field.rise, change))
+    change.x.array[:] = field.patterns[0].x.array
+    total = 0.0
+    for x, weight in zip(*np.polynomial.legendre.leggauss(5), strict=True):
+        now = 0.5 * time * (1.0 + x)
+        field.set(now)
+        u.x.array[:] = now * along
+        total += 0.5 * time * weight * dolfinx.fem.assemble_scalar(power)
+    return total
+
+
+@pytest.mark.parametrize("model", WARM)
+def test_work_of_a_temperature_is_that_of_its_forces(model: str) -> None:
+    """It is no remainder: the difference from the integral is of third order in the increment."""
+    warmer = fx.Temperature(lambda x: 60.0 + 40.0 * x[0])
+    continuum = Continuum(
+        box(MPI.COMM_SELF, model), WARM[model], MODELS[model], order=1, temperature=warmer
+    )
+    along, off = wavy(continuum, 0.3, 1).x.array.copy(), []
+    for time in (1.0, 0.5):
+        continuum.temperature.set(0.0)
+        term = term_of(continuum, WARM[model])
+        given, heat, gained = over_time(continuum, term, along, time)
+        assert given + heat == pytest.approx(gained, rel=1e-11)
+        exact = along_the_way(continuum, term, along, time)
+        assert abs(exact) > 0.05 * abs(gained)
+        off.append(heat - exact)
+        assert abs(off[-1]) < 0.2 * abs(gained)
+    assert abs(off[1]) < abs(off[0]) / 6.0

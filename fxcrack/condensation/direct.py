@@ -12,6 +12,7 @@ from __future__ import annotations
 import time
 
 import numpy as np
+import scipy.sparse as sp
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -80,6 +81,8 @@ class DirectCondensation:
         self._inner: PETSc.KSP | None = None
         self._inner_matrix: PETSc.Mat | None = None
         self._by_schur = method == "schur" or (method == "auto" and library() is not None)
+        # supports may prescribe, and interfaces retain, all that there is: S is A itself then
+        self._has_inner = self._comm.allreduce(coordinates.n_inner) > 0
         start = time.perf_counter()
         self._bordered = BorderedMatrix(stiffness, coordinates, borders, renewable=renewable)
         self.matrix, self.borders_on_retained = self._bordered.matrix, self._bordered.on_retained
@@ -103,7 +106,9 @@ class DirectCondensation:
     def _condense(self, *, gdim: int) -> None:
         """Take S out of a factorisation of the matrix, or build it; collective."""
         start = time.perf_counter()
-        if self._by_schur:
+        if not self._has_inner:
+            self.schur = self._all_last()
+        elif self._by_schur:
             try:
                 self._factorise(gdim)
             except SolverError as error:
@@ -151,6 +156,15 @@ class DirectCondensation:
                 "size that is physical in your units"
             )
         return otherwise
+
+    def _all_last(self) -> Array:
+        """S where no coordinate is eliminated, shape (n_last, n_last); collective."""
+        out = np.zeros((self.coordinates.n_last, self.coordinates.n_last))
+        indptr, indices, data = self.matrix.getValuesCSR()
+        if self._comm.rank == 0:
+            out[:] = sp.csr_matrix((data, indices, indptr), shape=out.shape).toarray()
+        self._comm.Bcast(out)
+        return 0.5 * (out + out.T)
 
     def _last_diagonal(self) -> Array:
         """Diagonal of A on the last coordinates, the same on every rank; collective."""
@@ -276,7 +290,7 @@ class DirectCondensation:
     @property
     def recovers(self) -> bool:
         """Whether displacements take no factorisation beside those that there are already."""
-        return self._factor is not None or self._inner is not None
+        return not self._has_inner or self._factor is not None or self._inner is not None
 
     def displacement(self, last: Array) -> PETSc.Vec:
         """Displacements for given last coordinates; collective, one back-solve.
@@ -287,8 +301,25 @@ class DirectCondensation:
         Returns:
             u on the displacement dofs; the caller destroys it.
         """
+        return self._moved(last, None)
+
+    def displacement_beside(self, inner: PETSc.Vec, last: Array) -> PETSc.Vec:
+        """Displacements for given last coordinates beside those of forces; collective.
+
+        Args:
+            inner: A_11^-1 r_1 from :meth:`reduced`; stays with the caller.
+            last: As in :meth:`displacement`.
+
+        Returns:
+            u on the displacement dofs; the caller destroys it.
+        """
+        return self._moved(last, inner)
+
+    def _moved(self, last: Array, inner: PETSc.Vec | None) -> PETSc.Vec:
         start = time.perf_counter()
         q = self.expanded(last)
+        if inner is not None:
+            q.axpy(1.0, inner)
         u = self.coordinates.transform.createVecLeft()
         self.coordinates.transform.mult(q, u)
         q.destroy()
@@ -342,6 +373,8 @@ class DirectCondensation:
     def _solve_inner(self, right: PETSc.Vec, q: PETSc.Vec) -> None:
         """Set q_1 = A_11^-1 right_1; the last entries of ``right`` are overwritten."""
         n_inner = self.coordinates.n_inner
+        if not self._has_inner:
+            return
         if self._factor is not None and self._factor.solves:
             right.array[n_inner:] = 0.0
             solution = right.duplicate()

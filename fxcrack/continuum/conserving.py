@@ -12,7 +12,9 @@ and generalised alpha weighs F = f + e of both ends instead of f:
 For alpha_f = 1/2 (rho_inf = 1) the mean of F is f_bar, and work and energies agree to the residual
 that the iteration leaves. f_bar keeps momentum and, but for continuum shells of first order, moment
 of momentum as well (Simo and Tarnow, ZAMP 43, 1992; Gonzalez, Comput. Methods Appl. Mech. Engrg.
-190, 2000).
+190, 2000). Where the temperature changes, W depends on it as well; the work of the temperature is
+what the change of W has beyond that of f_bar, its difference quotient in T: zero at a constant
+temperature, and of second order like f_bar.
 """
 
 from __future__ import annotations
@@ -47,6 +49,7 @@ class _Forms:
         begin: Displacement at the beginning of the increment.
         mean: Factor a.
         end: Factor b.
+        rise: T - T_ref at the beginning, where the bodies have a temperature.
     """
 
     def __init__(
@@ -56,12 +59,13 @@ class _Forms:
         begin: fem.Function,
         mean: float,
         end: float,
+        rise: fem.Function | None,
     ) -> None:
         self._begin = begin
         space = continuum.space
         v, du = ufl.TestFunction(space), ufl.TrialFunction(space)
         self._u, self._middle = fem.Function(space), fem.Function(space)
-        both = mean * term.mean_residual(self._u, begin, v)
+        both = mean * term.mean_residual(self._u, begin, v, rise)
         # symmetric, and off by the rotation over half an increment: it serves to iterate with
         tangent = 0.5 * mean * term.tangent(self._middle, v, du)
         if end:
@@ -171,14 +175,22 @@ class ConservingForces(Term):
         self._known = np.zeros(size)  # what F at the end has of the beginning
         self._kinds: _Forms | _Cells | None = None
         self._loss = 0.0
+        field = continuum.temperature
+        self._rise = None if field is None else fem.Function(field.rise.function_space)
+        self._at = self._time = 0.0  # of the last commit, and of the end of the increment
+        self._thermal = self._stored = 0.0  # work of the temperature, W of the last commit
 
     @property
     def _parts(self) -> _Forms | _Cells:
         """Forces and tangents, compiled on first use."""
         if self._kinds is None:
-            given = self._continuum, self._term, self._begin, self._mean, 1.0 - 0.5 * self._mean
-            kind = _Cells if isinstance(self._term, TiedElastic) else _Forms
-            self._kinds = kind(*given)  # type: ignore[arg-type]
+            c, term, begin, mean, rise = (
+                self._continuum, self._term, self._begin, self._mean, self._rise,
+            )  # fmt: skip
+            if isinstance(term, TiedElastic):
+                self._kinds = _Cells(c, term, begin, mean, 1.0 - 0.5 * mean)
+            else:
+                self._kinds = _Forms(c, term, begin, mean, 1.0 - 0.5 * mean, rise)
         return self._kinds
 
     def add_residual(self, forces: Array, u: fem.Function) -> None:
@@ -219,6 +231,11 @@ class ConservingForces(Term):
         self._begin.x.array[:] = u
         self._force = self._summed(self._parts.add_force, u)
         self._known = self._lack - 0.5 * self._mean * self._force
+        if self._rise is not None:
+            field = self._continuum.temperature
+            assert field is not None
+            self._rise.x.array[:] = field.rise.x.array
+            self._stored = self._comm.allreduce(self._parts.stored(u), op=MPI.SUM)
 
     def begin_at(self, u: fem.Function) -> None:
         """Begin the motion at a displacement that loads at rest have brought about."""
@@ -227,24 +244,38 @@ class ConservingForces(Term):
 
     def begin(self, time: float, dt: float) -> None:
         """Set what the increment knows of its beginning; collective."""
-        if not self._moves:
-            self._moves = True
+        self._moves = True
+        self._set_time(time)
         self._known = -self._mean * (0.5 * self._force + self._old * self._lack)
+
+    def _set_time(self, time: float) -> None:
+        """Set the temperature, if there is one."""
+        self._time = time
+        if self._continuum.temperature is not None:
+            self._continuum.temperature.set(time)
 
     def commit(self, u: fem.Function) -> None:
         """Take the end of the increment for the beginning of the next one; collective.
 
-        What the trapezoidal rule takes of F beyond the change of the energy counts as dissipated.
+        What the trapezoidal rule takes of F beyond the work of f_bar counts as dissipated.
         """
         before, n = self._force + self._lack, self._n_local
-        after = self._summed(self._parts.add, u.x.array) + self._known
+        both = self._summed(self._parts.add, u.x.array)
+        after, end = both + self._known, self._summed(self._parts.add_force, u.x.array)
+        step, stored = u.x.array - self._begin.x.array, self._stored
+        mean = (both - (1.0 - 0.5 * self._mean) * end) / self._mean
+        works = np.array([0.5 * (before + after)[:n] @ step[:n], mean[:n] @ step[:n]])
+        work, gained = self._comm.allreduce(works, op=MPI.SUM)
         if self._old != 0.5:
-            step = u.x.array - self._begin.x.array
-            work = 0.5 * float((before + after)[:n] @ step[:n])
-            gained = self._parts.stored(u.x.array) - self._parts.stored(self._begin.x.array)
-            self._loss += float(self._comm.allreduce(work - gained, op=MPI.SUM))
-        self._lack = after - self._summed(self._parts.add_force, u.x.array)
+            self._loss += float(work - gained)
+        self._lack, self._at = after - end, self._time
         self._settle_at(u.x.array)
+        if self._rise is not None:
+            self._thermal += float(self._stored - stored - gained)
+
+    def work(self) -> float:
+        """Work of the temperature up to the last commit."""
+        return self._thermal
 
     def spent(self) -> dict[str, float]:
         """Energy dissipated by the method, none where it keeps energy."""
@@ -255,12 +286,13 @@ class ConservingForces(Term):
 
         Returns:
             "u" (length) and "lack" (force): local dofs, ghosts too, shape (n_dofs,); "loss": energy
-            dissipated by the method, and 1 once the bodies have moved, shape (2,).
+            dissipated by the method, 1 once the bodies have moved, work of the temperature, and
+            time, shape (4,).
         """
         return {
             "u": self._begin.x.array.copy(),
             "lack": self._lack.copy(),
-            "loss": np.array([self._loss, float(self._moves)]),
+            "loss": np.array([self._loss, float(self._moves), self._thermal, self._at]),
         }
 
     def places(self) -> dict[str, Place]:
@@ -269,20 +301,18 @@ class ConservingForces(Term):
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state, F of which is the residual there; collective."""
-        self._loss, moves = (float(x) for x in state["loss"])
+        self._loss, moves, *more = (float(x) for x in state["loss"])
         self._moves = bool(moves)
+        if self._rise is not None:
+            self._thermal, self._at = more
+            self._set_time(self._at)
         self._lack = state["lack"].copy()
         self._settle_at(state["u"])
 
 
 def conserving(continuum: Continuum, terms: Sequence[Term], effect: Inertia) -> list[Term]:
-    """The same terms, those of finite strain such that they keep energy in motion.
-
-    Bodies whose temperature is given are left as they are: their energy depends on time.
-    """
+    """The same terms, those of finite strain such that they keep energy in motion."""
     kinds = Elastic, NeoHookeanBodies, TiedElastic
-    if continuum.temperature is not None:
-        return list(terms)
     return [
         ConservingForces(continuum, t, effect) if isinstance(t, kinds) and t.finite else t
         for t in terms

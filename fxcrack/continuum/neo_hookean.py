@@ -24,7 +24,7 @@ from fxcrack.continuum.kinematics import (
     labelled,
 )
 from fxcrack.continuum.term import StoringTerm
-from fxcrack.continuum.thermal_strain import expansion
+from fxcrack.continuum.thermal_strain import at_rise, expansion
 
 _CLOSE = 0.05
 """Where the difference over the sum is less, a series to its 10th power is exact to 1e-17."""
@@ -60,25 +60,41 @@ class NeoHookeanBodies(StoringTerm):
             total += stretch**3 * density(f, mu, lame) * c.weight * c.parts[i][2]
         return total
 
-    def mean_residual(self, u: fem.Function, begin: fem.Function, v: Any) -> Any:
+    def mean_residual(
+        self, u: fem.Function, begin: fem.Function, v: Any, rise: fem.Function | None = None
+    ) -> Any:
         """Forces over an increment whose work is the change of the strain energy, UFL.
 
-        With C = F^t F and j = det C, W = mu/2 (tr C - 3) + phi(j): the mean of the cofactor of C
-        by Simpson's rule times the change of C is the change of j, and phi has a difference
-        quotient. No temperature.
+        With C = F^t F, j = det C and the thermal stretch s,
+
+            W = mu/2 (s tr C - 3 s^3) + s^3 phi(ln j - 6 ln s)
+
+        The mean of the cofactor of C by Simpson's rule times the change of C is the change of j,
+        phi and ln have difference quotients, and the change of a product is the mean of one factor
+        times the change of the other, both ways.
+
+        Args:
+            u: Displacement at the end.
+            begin: Displacement at the beginning.
+            v: Test function.
+            rise: T - T_ref at the beginning, where the bodies have a temperature.
         """
         c = self._continuum
         change = displacement_gradient(c.model, v, c.x)
+        first, last = (deformation_gradient(c.model, x, c.x) for x in (begin, u))
+        middle = 0.5 * (first + last)
+        c0, c1 = first.T * first, last.T * last
+        mean = (cofactor(c0) + 4 * cofactor(0.5 * (c0 + c1)) + cofactor(c1)) / 6
+        j0, j1 = ufl.det(c0), ufl.det(c1)
         total = 0
         for i in self._parts:
-            first, _, mu, lame = self._elastic_part(begin, i)
-            last, _, _, _ = self._elastic_part(u, i)
-            middle = 0.5 * (first + last)
-            c0, c1 = first.T * first, last.T * last
-            mean = (cofactor(c0) + 4 * cofactor(0.5 * (c0 + c1)) + cofactor(c1)) / 6
-            j0, j1 = ufl.det(c0), ufl.det(c1)
-            slope = _log_quotient(j0, j1) * (-mu / 2 + lame / 8 * (ufl.ln(j0) + ufl.ln(j1)))
-            stress = mu * ufl.Identity(3) + 2 * slope * mean
+            _, s1, mu, lame = self._elastic_part(u, i)
+            s0 = at_rise(c, s1, rise)
+            logs = ufl.ln(j0) + ufl.ln(j1)
+            if c.temperature is not None:
+                logs -= 6 * (ufl.ln(s0) + ufl.ln(s1))
+            slope = 0.5 * (s0**3 + s1**3) * _log_quotient(j0, j1) * (-mu / 2 + lame / 8 * logs)
+            stress = 0.5 * (s0 + s1) * mu * ufl.Identity(3) + 2 * slope * mean
             total += ufl.inner(middle * stress, change) * c.weight * c.parts[i][2]
         return total
 

@@ -208,6 +208,49 @@ class StrainCells:
                     second[at] += self._geometric(back)
         return Response(energy, residual, second)
 
+    # -- parts of the strains, for what linear cells leave out ----------------------------
+
+    def linear_part(self, at: slice, q: Array) -> Array:
+        """Covariant strains linear in the changes q of some cells, (n, n_points, n_covariant)."""
+        return self._pairing(self.vectors[at], q)
+
+    def quadratic_part(self, q: Array) -> Array:
+        """Covariant strains quadratic in the changes q of some cells, likewise."""
+        return 0.5 * self._pairing(q, q)
+
+    def _pairing(self, r: Array, q: Array) -> Array:
+        """Products r . M q, shape (n, n_points, n_covariant)."""
+        return np.asarray(np.einsum("cpkj,cj->cpk", self._products(r), q.reshape(len(q), -1)))
+
+    def stress(self, at: slice, covariant: Array, given: Array | None) -> Array:
+        """Stresses with the weights, conjugate to covariant strains, enhanced strains eliminated.
+
+        Args:
+            at: The cells.
+            covariant: Their covariant strains, shape (n, n_points, n_covariant).
+            given: Given stress s with the weights, shape (n, n_points, n_strains).
+
+        Returns:
+            Shape (n, n_points, n_covariant).
+        """
+        e = self._with_enhanced(at, self._to_local(at, covariant), given)
+        force = np.einsum("cpst,cpt->cps", self.moduli[at], e)
+        if given is not None:
+            force = force - given
+        if self.local is None:
+            return np.asarray(force)
+        return np.asarray(np.einsum("cpsk,cps->cpk", self.local[at], force))
+
+    def forces(self, r: Array, stress: Array) -> Array:
+        """sigma_k M_k r of some cells, shape (n, 3 n_vectors).
+
+        Args:
+            r: Vectors: those of the undeformed cells for the forces of a stress, changes of them
+                for those of its geometric stiffness; shape (n, n_vectors, 3).
+            stress: From :meth:`stress`.
+        """
+        return np.asarray(np.einsum("cpkj,cpk->cj", self._products(r), stress))
+
     def _geometric(self, stress: Array) -> Array:
         """sigma_k M_k on the components of all vectors, of covariant stresses with the weights."""
         p, k, m, _ = self.matrices.shape

@@ -134,6 +134,19 @@ def whole(model: Model, strain: Any) -> Any:
     return ufl.as_vector([e[0], e[1], 0, 0, 0, e[2]])
 
 
+def at_rise(continuum: Continuum, expression: Any, rise: fem.Function | None) -> Any:
+    """A UFL expression at another temperature than the present one.
+
+    Args:
+        continuum: Where the present temperature is.
+        expression: Contains it, or does not.
+        rise: T - T_ref instead; ``None`` leaves the present one, or none.
+    """
+    if continuum.temperature is None or rise is None:
+        return expression
+    return ufl.replace(expression, {continuum.temperature.rise: rise})
+
+
 def whole_stiffness(continuum: Continuum, i: int) -> Any:
     """Stiffness of a part on :func:`whole` strains, UFL."""
     return continuum.by_temperature(i, lambda m: _whole_matrix(continuum.model, m.stiffness()))

@@ -21,22 +21,19 @@ import scipy.sparse as sp
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.interface.frames import local_frames
 from fxcrack.interface.mortar import surface_weights
-from fxcrack.interface.pair import NEAR, Pair
+from fxcrack.interface.pair import NEAR, Pair, has_slid
 from fxcrack.interface.projection import project
 from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.rigid_pairing import renewed_on
 from fxcrack.interface.surface import FacetSurface
 
-_SLIDE = 1e-3
-"""Part of a facet a node may slide, and angle its normal may turn, before it is paired anew. Ten
-times as much changes forces by 0.3 % (a clamped beam that turns) to 0.5 % (friction in bending)."""
 _OF_MASTERS = ("masters", "weights")
 _CHANGING = ("paired", "frames", "gap")
 
 
 def renewed(
     pair: Pair, bonded: Bools, master: FacetSurface | RigidSurface, u_slave: Array,
-    u_master: Array, *, turned: float = np.inf,
+    u_master: Array, *, pressed: Bools | None = None, turned: float = np.inf,
 ) -> Pair | None:  # fmt: skip
     """A pair with its open nodes projected on the present master surface.
 
@@ -47,6 +44,8 @@ def renewed(
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
         u_master: Displacements of the master nodes, shape (master.n_nodes, gdim), length; none,
             shape (0, gdim), of a rigid surface.
+        pressed: Nodes that faces press on, which follow the smallest change, shape (n_nodes,);
+            ``None`` where that is not known.
         turned: Angle by which the normal may turn where gaps are too large to close; not of rigid
             surfaces.
 
@@ -56,11 +55,11 @@ def renewed(
     """
     if pair.hierarchy is not None:
         found = renewed(
-            pair.by_nodes(), bonded, master, u_slave, u_master, turned=turned
+            pair.by_nodes(), bonded, master, u_slave, u_master, pressed=pressed, turned=turned
         )  # fmt: skip
         return None if found is None else found.by_corners()
     if not isinstance(master, FacetSurface):
-        return renewed_on(pair, bonded, u_slave)
+        return renewed_on(pair, bonded, u_slave, pressed)
     gdim = u_slave.shape[1]
     x, y = pair.surface.x.copy(), master.x.copy()
     x[:, :gdim] += u_slave
@@ -78,10 +77,10 @@ def renewed(
         means = surface_weights(pair.whole_surface.moved(x), now, foot, NEAR * size)
         nodes, new = means.masters, means.weights
     # by nodes: above a node the facet is one or the other by round-off, its weights are the same
-    slid = _change(pair, now.dofs[nodes], new) > _SLIDE
+    slid = has_slid(_change(pair, now.dofs[nodes], new), pressed)
     near = over & (gap < NEAR * size)
     turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
-    slid |= turn > _SLIDE
+    slid |= has_slid(turn, pressed)
     if not np.any(near & (slid | ~pair.paired)) and not np.any(over & (turn > turned)):
         return None
     frames, gaps = pair.frames.copy(), pair.gap.copy()

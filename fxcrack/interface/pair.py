@@ -20,6 +20,22 @@ FACING = -0.5
 """Cosine between the outward normals of two surfaces that face each other, at most."""
 NEAR = 0.5
 """Parts of a facet within which a gap may close in the next increment."""
+_SLID, _PRESSED = 1e-3, 1e-7
+"""Changes of weights (parts of a facet) and normals (angles) below which the pairing of open faces,
+and of those that press on each other, stays. The latter is round-off: where contact forces act, no
+threshold decides. Following open faces always as well changes loads at onset by 2e-6 and takes up
+to 1.7 times as long."""
+
+
+def has_slid(change: Array, pressed: Bools | None) -> Bools:
+    """Whether slave nodes have slid so far that they are paired anew, shape (n_nodes,).
+
+    Args:
+        change: Changes of their weights or normals, shape (n_nodes,).
+        pressed: Nodes that faces press on, shape (n_nodes,); ``None`` where that is not known.
+    """
+    least = _SLID if pressed is None else np.where(pressed, _PRESSED, _SLID)
+    return np.asarray(change > least)
 
 
 @dataclass(frozen=True)

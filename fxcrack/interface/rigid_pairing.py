@@ -21,12 +21,9 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.interface.frames import local_frames
-from fxcrack.interface.pair import FACING, NEAR, Pair
+from fxcrack.interface.pair import FACING, NEAR, Pair, has_slid
 from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.surface import FacetSurface, facet_element
-
-_TURNED = 0.01
-"""Angle by which the normal below a node turns before it is paired anew."""
 
 
 def check_symmetry(where: str, surface: RigidSurface, model: object) -> None:
@@ -144,15 +141,19 @@ def find_partners(
 
 
 def renewed_on(
-    pair: Pair, bonded: Bools, u_slave: Array, *, turned: float = _TURNED
-) -> Pair | None:
+    pair: Pair, bonded: Bools, u_slave: Array, pressed: Bools | None = None, *,
+    turned: float | None = None,
+) -> Pair | None:  # fmt: skip
     """A pair with normals and gaps of its open nodes where they are now.
 
     Args:
         pair: The pair as it is, with a rigid master.
         bonded: Slave nodes that are bonded now, or whose bonds still pull, shape (n_nodes,).
         u_slave: Displacements of the slave nodes, shape (n_nodes, gdim), length.
-        turned: Angle by which the normal below a node turns before it is paired anew.
+        pressed: Nodes that are in contact, which follow the smallest change, shape (n_nodes,);
+            ``None`` where that is not known.
+        turned: Angle by which the normal below a node turns before it is paired anew, in place of
+            what is chosen otherwise.
 
     Returns:
         ``None`` if no gap that may close has changed enough to matter.
@@ -167,7 +168,8 @@ def renewed_on(
     over = ~bonded & (pair.paired | facing)
     near = over & (distance < NEAR * pair.surface.facet_size)
     turn = np.linalg.norm(normals[:, :gdim] - pair.frames[:, :, 0], axis=1)
-    if not np.any(near & ((turn > turned) | ~pair.paired)):
+    slid = has_slid(turn, pressed) if turned is None else turn > turned
+    if not np.any(near & (slid | ~pair.paired)):
         return None
     if surface.flat:
         over &= ~pair.paired  # the gaps of all others are as they were

@@ -72,7 +72,7 @@ class DeformedInterfaces:
             moved[:, : self._gdim] += self._reader.displacements(values, pair.surface)
             front.follow(moved)
 
-    def pair_anew(self, u: PETSc.Vec, pulling: list[Bools]) -> bool:
+    def pair_anew(self, u: PETSc.Vec, pulling: list[Bools], pressed: list[Bools]) -> bool:
         """Pair open nodes with the master surface where it is now; whether any changed.
 
         Collective.
@@ -81,6 +81,7 @@ class DeformedInterfaces:
             u: Displacement, owned dofs.
             pulling: Per pair, nodes whose bonds are released but still carry a force: it acts on
                 the master point they were bonded to, shape (n_nodes,).
+            pressed: Per pair, nodes in contact, shape (n_nodes,).
         """
         if not self.follow_sliding:
             return False
@@ -98,6 +99,7 @@ class DeformedInterfaces:
                 self._reader.displacements(values, master)
                 if isinstance(master, FacetSurface)
                 else np.zeros((0, self._gdim)),
+                pressed=pressed[p],
             )
             if new is not None:
                 self._pairs[p], changed = new, True
@@ -150,6 +152,17 @@ def pulling(index: list[Ints], force: Array, soft: CohesiveBonds) -> list[Bools]
     for bond in soft.bonds:
         out[bond.where[0]][bond.where[1]] = True
     return out
+
+
+def pressed(index: list[Ints], closed: Bools) -> list[Bools]:
+    """Nodes per pair that are in contact, shape (n_nodes,).
+
+    Args:
+        index: As for :func:`pulling`.
+        closed: Normal components in contact, shape (n_retained,).
+    """
+    touch = np.append(closed, False)
+    return [touch[numbers].any(axis=1) for numbers in index]
 
 
 class PairingEnergy:
@@ -212,4 +225,4 @@ class PairingEnergy:
             self._before = None
 
 
-__all__ = ["DeformedInterfaces", "PairingEnergy", "pulling"]
+__all__ = ["DeformedInterfaces", "PairingEnergy", "pressed", "pulling"]

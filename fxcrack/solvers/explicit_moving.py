@@ -156,12 +156,12 @@ class MovingInterfaces:
         lumped.gap[at] = new.gap[loose] - np.minimum(gap, 0.0)
         return True
 
-    def _renew_on_rigid(self, p: int, **options: float) -> bool:
+    def _renew_on_rigid(self, p: int, *, turned: float | None = None) -> bool:
         """Take normals and gaps on a rigid surface; whether other nodes are paired now."""
         lumped, nodes, pair = self._dynamics.lumped, self._nodes[p], self._pairs[p]
         assert nodes is not None
         held = self._held(p)
-        new = renewed_on(pair, held, self._dynamics.u[nodes[0]], **options)
+        new = renewed_on(pair, held, self._dynamics.u[nodes[0]], turned=turned)
         if new is None:
             return False
         self._pairs[p] = new

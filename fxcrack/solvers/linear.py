@@ -350,6 +350,51 @@ class LinearSolver(InterfaceSolver):
         last[: self.system.n_retained] = jump
         return self.condensation.displacement(last)
 
+    @property
+    def responds(self) -> bool:
+        """Whether :meth:`response` takes back-substitutions and no new factorisation."""
+        return isinstance(self.condensation, DirectCondensation) and self.condensation.recovers
+
+    def response(self, forces: Array) -> Array:
+        """Displacement by further forces, supports, loads, bonds and contact as they are.
+
+        Collective.
+
+        Args:
+            forces: On the dofs that this rank owns, shape (n_local,).
+
+        Returns:
+            Of the dofs that this rank owns, shape (n_local,), length.
+        """
+        condensation = self.condensation
+        assert isinstance(condensation, DirectCondensation)
+        size = self.continuum.n_local, self.continuum.n_global
+        right = PETSc.Vec().createMPI(size, comm=self.continuum.comm)
+        right.array[:] = forces
+        condensed, inner = condensation.reduced(right)
+        right.destroy()
+        jump, _ = self.system.rates(np.zeros(self.n_loads), condensed[: self.system.n_retained])
+        u = condensation.displacement_beside(inner, np.pad(jump, (0, len(condensed) - len(jump))))
+        inner.destroy()
+        out = u.array_r.copy()
+        u.destroy()
+        return np.asarray(out)
+
+    def elastic_work(self, u: Array) -> float:
+        """Twice the energy u K u of a displacement, force x length; collective.
+
+        Args:
+            u: Of the dofs that this rank owns, shape (n_local,), length.
+        """
+        stiffness = self._assembled()
+        right, left = stiffness.createVecs()
+        right.array[:] = u
+        stiffness.mult(right, left)
+        out = float(right.dot(left))
+        right.destroy()
+        left.destroy()
+        return out
+
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies, K u - f.
 

@@ -22,7 +22,7 @@ from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.condensed_tangent import CondensedRequest, condense_tangent
-from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy, pulling
+from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy, pressed, pulling
 from fxcrack.solvers.free_motion import moves_freely
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
 from fxcrack.solvers.increment_work import in_pieces
@@ -153,7 +153,9 @@ class NewtonSolver(InterfaceSolver):
             goes on to its equilibrium (:meth:`settle`).
         """
         changed = self.interfaces.pair_anew(
-            self.u, pulling(self.index, self.state.force, self.system.soft)
+            self.u,
+            pulling(self.index, self.state.force, self.system.soft),
+            pressed(self.index, self.system.closed),
         )
         if changed:
             self.rebase()
@@ -192,7 +194,8 @@ class NewtonSolver(InterfaceSolver):
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
         if self.bodies.dynamic:
             force = self.state.force  # no motion over a zero time step
-        self.move(self.state.loads, force, self.at, 0.0, follow=False, confirm=False)
+        soft = bool(self.system.soft.bonds)  # they may run through unstable states on the way
+        self.move(self.state.loads, force, self.at, 0.0, follow=soft, confirm=False)
         # overlapping faces and new pairings have energies of their own
         self.confirm(strict=None)
         self.commit()

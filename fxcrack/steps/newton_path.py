@@ -83,9 +83,16 @@ class NewtonLoadPath:
         bracket: Bracket | None = None
         accepted, idle, strict = 0, 0, True  # increments accepted since the last cutback
         undecided = 0  # how often f was on both sides of 1 at one load
+        previous: tuple[float, float] | None = None  # time and f before the last increment
         while True:
             if self._renew():
                 beyond = bracket = None  # with other pairs f was another one there
+                off = (self._analysis.largest - 1.0) * (1.0 if upward else -1.0)
+                if off >= -_AT_ONE:
+                    # f = 1 lies between its values before and after: it is that of the new pairs
+                    if off > _AT_ONE and previous is not None and self._reversible:
+                        self._back_to_one(previous)
+                    return True
             begin = self._analysis.time
             way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
             guess = self._predicted(begin + way, upward=upward)
@@ -126,6 +133,7 @@ class NewtonLoadPath:
             before, self._analysis.tip_values = self._analysis.largest, values
             self._analysis.advance(point, guess)
             self._solver.commit()
+            previous = begin, before
             if crossed:
                 self._back_to_one((begin, before))
                 return True

@@ -1,4 +1,4 @@
-"""Random scenes by seed: some of them, those that failed once, and those that fail.
+"""Random scenes by seed: some of them, and those that failed once.
 
 FXCRACK_SEEDS=first:last runs those seeds in place of the first ones; ``make random SEEDS=0:500``
 runs all 500 and writes docs/combinations.md.
@@ -27,20 +27,16 @@ FOUND = {
     253: "path stepping with friction turned back and forth for ever",
     264: "likewise, on a path: f of another tip than the growing one differed by 6e-4",
     339: "likewise, in motion: other units changed the energies by 1e-3",
+    392: "a new pairing beside a bond that is neutral at onset went past its softening: contact "
+    "did not settle, and the step stopped",
+    407: "faces were paired anew where f had just come to 1 and went above it: event stepping "
+    "released there, path stepping went back, and the onset loads differed by 4e-5",
     441: "a resumed step went on with the tangent of another state, 2e-7 of the work",
     480: "a new pairing after a release moved the faces far: 2e-4 of the energy was missing",
 }
 """Seeds of scenes that failed once, and of what."""
 
-OPEN = {
-    392: "bonds that are neutral at onset (closure) with a ramp at finite strain: contact does not "
-    "settle, and the step stops",
-    407: "faces are paired anew where f has just come to 1 and goes above it: event stepping "
-    "releases there, path stepping goes back, and the onset loads differ by 4e-5",
-}
-"""Seeds of scenes that fail, and of what."""
-
-WITH_RELATION = (174, 264, 339, 441)
+WITH_RELATION = (174, 264, 339, 407, 441)
 """Those in which another description, or a restart, gave another history."""
 
 
@@ -58,9 +54,3 @@ def test_scenes_that_failed_once(seed: int) -> None:
     c = Combination.of(seed)
     bad = fails(seed) if seed in WITH_RELATION else faults(c, run_scene(c))
     assert not bad, (c, FOUND[seed])
-
-
-@pytest.mark.parametrize("seed", OPEN)
-def test_scenes_that_fail(seed: int) -> None:
-    if bad := fails(seed):
-        pytest.xfail(f"{bad}: {OPEN[seed]}")
