@@ -216,8 +216,8 @@ def test_one_surface_named_alone(tmp_path):
         ("NAME=I\n", "NAME=I\n*FRICTION, ROUGH\n", "ROUGH is not available"),
         (
             "NAME=I\n",
-            "NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E6\n",
-            "PRESSURE-OVERCLOSURE=LINEAR is not available",
+            "NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=TABULAR\n0., 0.\n",
+            "PRESSURE-OVERCLOSURE=TABULAR is not available",
         ),
         ("NAME=I\n", "NAME=I\n*COHESIVE BEHAVIOR\n1.\n", "cohesive zones are not available"),
         (

@@ -15,7 +15,10 @@ from tests.decks import BONDED, OPENED, PLATE, STEP, VCCT
 from tests.test_deck_distributing import BLOCK
 from tests.test_deck_explicit import DECK as EXPLICIT
 from tests.test_deck_joined_pairs import two
+from tests.test_deck_local_axes import ORTHOTROPIC
 from tests.test_deck_mesh import GENERATED, PARTS
+from tests.test_deck_rigid import BLOCK as RIGID
+from tests.test_deck_rigid import CUBE, FACETS
 from tests.test_deck_surface_shells import ARMS as SHELLS
 
 BASE = [
@@ -32,6 +35,14 @@ BASE = [
     EXPLICIT,
     SHELLS,
     two(),
+    RIGID,
+    CUBE.format(surface=FACETS, body="ELSET=R"),
+    ORTHOTROPIC
+    + "*DISTRIBUTION, NAME=D, LOCATION=ELEMENT\n, 1., 0., 0., 0., 1., 0.\nLAST, 0., 1., 0., -1.,"
+    "0., 0.\n*ORIENTATION, NAME=O, SYSTEM=CYLINDRICAL\n0.5, 0., 0., 0.5, 0., 1.\n3, 90.\n"
+    "*TRANSFORM, NSET=LEFT, TYPE=C\n-1., 0., 0., -1., 0., 1.\n*SYSTEM\n1., 2., 0., 1., 3., 0.\n"
+    "*NODE\n77, 1., 1.\n*DENSITY\n1.\n*STEP\n*STATIC\n*BOUNDARY\nLEFT, 2\n*CLOAD\nLEFT, 1, 1.\n"
+    "*DLOAD\nPLATE, CENTRIF, 1., 0., 0., 0., 0., 1., 0.\n*END STEP\n",
     BLOCK.format(nlgeom="", load="*CLOAD\nREF, 3, 1.\nREF, 4, 1."),
 ]
 WORDS = st.sampled_from(
@@ -39,6 +50,8 @@ WORDS = st.sampled_from(
         *("", ",", "*", "**", "=", '"', "0", "-1", "1e400", "nan", "1D5", "99999999999999999999"),
         *("A", "LEFT", "S1", "<a>", "<b>", "*NODE", "*STEP", "*END STEP", "GENERATE", "\t", "\x00"),
         *("TYPE=", "TYPE=CPE8", "NSET=LEFT", "NAME=", "INPUT=model.inp", "é", "1.5.5", "+", "/"),
+        *("D", "O", "SYSTEM=SPHERICAL", "DEFINITION=NODES", "TYPE=R3D4"),
+        *("TYPE=REVOLUTION", "CIRCL", "LINE", "ALL, 1, 1"),
         *("*ELGEN", "*NFILL", "*NCOPY, SHIFT", "*INCLUDE, INPUT=model.inp", "*EQUATION", "3"),
     ]
 )

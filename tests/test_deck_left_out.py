@@ -73,6 +73,14 @@ def test_rotation_of_a_body(shared_path):
         deck.scene.close()
 
 
+def test_an_element_set_where_a_node_set_is_meant(tmp_path, caplog):
+    text = PLATE + "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nPLATE, 20.\n"
+    assert read(tmp_path, text + STEP).arguments["effects"][0].reference == 20.0
+    assert "the nodes of the element set of this name are meant" in caplog.text
+    with pytest.raises(DeckError, match="there is no node set 'PLATES'"):
+        read(tmp_path, text.replace("PLATE, 20.", "PLATES, 20.") + STEP)
+
+
 def test_axis_of_rotation_in_a_plane(tmp_path):
     text = PLATE + "*DENSITY\n3.\n"
     step = "*STEP\n*STATIC\n*DLOAD\n{}\n*END STEP\n"

@@ -7,9 +7,11 @@ import pytest
 
 import fxcrack as fx
 from fxcrack.deck.cards import DeckError
+from fxcrack.deck.deck import translated as read_path
 from tests.decks import BONDED, OPENED, VCCT, read, write
 
 FLOOR = "*SURFACE, TYPE=SEGMENTS, NAME=FLOOR\nSTART, -5., 0.\nLINE, 5., 0.\n"
+ROLL = "*SURFACE, TYPE=SEGMENTS, NAME=FLOOR\nSTART, -5., -5.\nCIRCL, 5., -5., 0., -5.\n"
 BODY = "*RIGID BODY, REF NODE=REF, ANALYTICAL SURFACE=FLOOR\n"
 BLOCK = f"""*NODE
 1, 0., 0.
@@ -197,12 +199,14 @@ def test_surfaces_in_space(tmp_path, kind, lines, expected):
     refused(tmp_path, text.replace("90, 1, 6", "90, 1, 5"), "component 6 of the reference")
 
 
+FACETS = (
+    "*NODE\n91, -5., -5.\n92, 5., -5.\n93, 5., 5.\n94, -5., 5.\n*ELEMENT, TYPE=R3D4, ELSET=R\n"
+    "9, 91, 92, 93, 94\n*SURFACE, NAME=FLOOR\nR, SPOS"
+)
+
+
 def test_surfaces_of_rigid_facets(tmp_path):
-    surface = (
-        "*NODE\n91, -5., -5.\n92, 5., -5.\n93, 5., 5.\n94, -5., 5.\n*ELEMENT, TYPE=R3D4, ELSET=R\n"
-        "9, 91, 92, 93, 94\n*SURFACE, NAME=FLOOR\nR, SPOS"
-    )
-    text = CUBE.format(surface=surface, body="ELSET=R")
+    text = CUBE.format(surface=FACETS, body="ELSET=R")
     assert master(tmp_path, text) == fx.RigidPlane((-5.0, -5.0, 0.0), (0.0, 0.0, 1.0))
     assert master(tmp_path, text.replace("SPOS", "SNEG")).normal == (0.0, 0.0, -1.0)
 
@@ -248,3 +252,70 @@ def test_a_half_model_on_a_plane_of_symmetry(tmp_path):
     assert any("of a half model half of the whole" in line for line in found.report.replaced)
     far = text.replace("START, -1., 1.\nLINE, 9., 1.", "START, -1., 0.5\nLINE, 9., 0.5")
     refused(tmp_path, far + step.format(criterion=VCCT), "bonded nodes do not lie on the rigid")
+
+
+def test_adjusted_gaps_to_a_rigid_surface(tmp_path):
+    """Nodes on it begin closed; those of a body beside a cylinder keep their gaps."""
+    text = BLOCK.replace("INTERACTION=I\nLOW", "INTERACTION=I, ADJUST=0.\nLOW")
+    (flat,) = read(tmp_path, text).arguments["bonds"]
+    assert flat.gap == "adjust" and flat.tolerance is None
+    found = read(tmp_path, text.replace(FLOOR, ROLL))
+    (round_one,) = found.arguments["bonds"]
+    assert round_one.gap == "keep" and round_one.tolerance > 0.38  # of the corner, sqrt(29) - 5
+    assert any("those to the rigid surface stay" in line for line in found.report.replaced)
+
+
+def test_stiff_linear_contact_is_exact_contact(tmp_path):
+    soft = "NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n{}\n*CONTACT"
+    text = BLOCK.replace("NAME=I\n*CONTACT", soft)
+    found = read(tmp_path, text.format("1E4"))  # E / (k h) = 100 / (1E4 1)
+    assert any("gives way 0.01 times as much" in line for line in found.report.replaced)
+    refused(tmp_path, text.format("100."), "gives way 1 times as much")
+
+
+SCENES = [
+    ("CPE4", fx.RigidPlane((0.3, -0.1), (0.6, 0.8))),
+    ("CPE4", fx.RigidCylinder((0.7, -3.0), (0, 0, 1), 2.9)),
+    ("CAX4", fx.RigidSphere((0.0, -3.0), 2.9)),
+    ("CAX4", fx.RigidCylinder((0.0, 0.0), (0, 1, 0), 2.1, inside=True)),
+    ("C3D8", fx.RigidPlane((0.3, 0.2, -0.1), (0.48, 0.36, 0.8))),
+    ("C3D8", fx.RigidCylinder((0.7, 0.0, -3.0), (0.6, 0.8, 0.0), 2.9)),
+    ("C3D8", fx.RigidSphere((0.3, 0.4, -3.0), 2.9)),
+]
+
+
+@pytest.mark.parametrize(("kind", "surface"), SCENES, ids=lambda v: str(v)[:30])
+def test_rigid_masters_that_are_written(tmp_path, kind, surface):
+    """A scene written and read again meets the same surface."""
+    text = CUBE.format(surface=FACETS, body="ELSET=R") if kind == "C3D8" else BLOCK
+    if isinstance(surface, fx.RigidCylinder) and surface.inside:  # it faces the end of the block
+        pair = "*CONTACT PAIR, INTERACTION=I\nLOW, FLOOR\n"
+        text = text.replace("B, S1", "2, S2").replace(pair, "")
+    deck = fx.read_deck(write(tmp_path, text.replace("CPE4", kind)))
+    away = fx.Interface("LOW", surface, contact=True, gap="keep", bonded=_nowhere, tolerance=5.0)
+    scene = deck.scene.rebuilt(bonds=[away])
+    fx.write_deck(scene, deck.steps, tmp_path / "out.inp")
+    (found,) = read_path(tmp_path / "out.inp").arguments["bonds"]
+    x = scene.pairs[0].surface.x
+    mine, its = surface.measure(x), found.master.measure(x)
+    # coordinates are written to the last bit, axes are found anew from points: round-off
+    assert np.allclose(mine[0], its[0], atol=1e-14) and np.allclose(mine[1], its[1], atol=1e-14)
+    scene.close()
+
+
+def _nowhere(x):
+    return np.zeros(np.shape(x)[1], dtype=bool)
+
+
+def test_rigid_masters_that_are_not_written(tmp_path):
+    deck = fx.read_deck(write(tmp_path, BLOCK))
+    plane = fx.RigidPlane((0.0, 0.0), (0.0, 1.0))
+    whole = fx.Interface("LOW", plane, contact=True, symmetry=True)
+    scene = deck.scene.rebuilt(bonds=[whole])
+    with pytest.raises(fx.InputError, match="symmetry=True, where rates are those of the whole"):
+        fx.write_deck(scene, deck.steps, tmp_path / "out.inp")
+    roll = fx.RigidCylinder((0.0, -5.0), (0, 0, 1), 5.0)
+    near = fx.Interface("LOW", roll, contact=True, bonded=_nowhere)
+    scene = deck.scene.rebuilt(bonds=[near])
+    with pytest.raises(fx.InputError, match="slave nodes away from the rigid surface"):
+        fx.write_deck(scene, deck.steps, tmp_path / "out.inp")

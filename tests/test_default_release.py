@@ -13,6 +13,7 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
+from fxcrack.output.explain import explain
 from fxcrack.steps.release_choice import choose_release
 
 STEEL = fx.Isotropic(70e3, 0.3)
@@ -101,6 +102,8 @@ def test_the_default_is_progressive_release(comm: MPI.Intracomm) -> None:
     for release in (None, PROGRESSIVE, STEP):
         scene = arms(comm, release=release)
         histories.append(scene.run(fx.Static(until=fx.Releases(6)), progress=False))
+        law = {None: "ProgressiveRelease, by default", PROGRESSIVE: "ProgressiveRelease"}
+        assert f"release of 'bond': {law.get(release, 'StepRelease')}\n" in str(explain(scene))
         scene.close()
     default, named, once = histories
     for column in ("time", "R[end_upper.y]", "f[bond]", "released_energy"):

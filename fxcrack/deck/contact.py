@@ -22,7 +22,7 @@ from fxcrack.deck.flat import Flat
 from fxcrack.deck.fracture import NodalRates, read_criterion
 from fxcrack.deck.general_contact import GeneralContact
 from fxcrack.deck.groups import Groups
-from fxcrack.deck.interactions import friction, interaction, note_thickness
+from fxcrack.deck.interactions import friction, interaction, note_softness, note_thickness
 from fxcrack.deck.joined_pairs import join_pairs, joined_criterion
 from fxcrack.deck.model import Family
 from fxcrack.deck.pair_def import PairDef, bonded_nodes, slave_nodes
@@ -39,6 +39,8 @@ _RAMP = 5
 """Increments over which a ramp falls that cannot fall with the opening."""
 _BEYOND = 1.001
 """Search tolerance of rigid masters over the largest distance of a slave node."""
+_NEAR = 0.1
+"""Distance from a rigid master up to which nodes lie on it, over the size of the facets."""
 _COINCIDENT = 1e-6
 """Distance of nodes at one place, over the size of the facets."""
 
@@ -361,6 +363,8 @@ class Contacts:
         gap = "adjust" if card.has("ADJUST") or card.has("TIED") else "keep"
         if self._clearance_of(pair):
             gap = "adjust"
+        if tolerance is not None and gap == "adjust":
+            gap, tolerance = self._gap_to_rigid(pair, tolerance)
         return Interface(
             slave,
             master,
@@ -374,15 +378,35 @@ class Contacts:
             name=pair.title,
         )
 
+    def _gap_to_rigid(self, pair: PairDef, distance: float) -> tuple[str, float | None]:
+        """How gaps to a rigid master begin where the deck adjusts them, and the search tolerance.
+
+        Args:
+            pair: The pair.
+            distance: That tolerance, which reaches all slave nodes.
+        """
+        if distance <= _NEAR * self._facet_size(pair):
+            return "adjust", None
+        self._report.replace(
+            "only gaps that are small beside the elements count as zero; those to the rigid "
+            "surface stay as they are",
+            pair.row.card,
+        )
+        return "keep", distance
+
+    def _facet_size(self, pair: PairDef) -> float:
+        """Mean size of the facets of the slave surface, length."""
+        rows = self._flat.surface(pair.row.card, pair.slave, pair.row.index)
+        return float(np.linalg.norm(np.ptp(self._flat.points[rows], axis=1), axis=1).mean())
+
     def _check_bonded(self, pair: PairDef, master: Surface) -> None:
         """Refuse bonded nodes away from a rigid master."""
         nodes = bonded_nodes(pair, self._flat)
-        rows = self._flat.surface(pair.row.card, pair.slave, pair.row.index)
-        size = float(np.linalg.norm(np.ptp(self._flat.points[rows], axis=1), axis=1).mean())
+        near = _NEAR * self._facet_size(pair)
         off = np.abs(master.measure(self._flat.points[nodes])[0])
-        if pair.bonded is not None and off.max(initial=0.0) > 0.1 * size:
+        if pair.bonded is not None and off.max(initial=0.0) > near:
             pair.bonded.fail(
-                f"{int((off > 0.1 * size).sum())} bonded nodes do not lie on the {master}, the "
+                f"{int((off > near).sum())} bonded nodes do not lie on the {master}, the "
                 f"farthest is {off.max():.3g} away; move it to them, or take them out of the set"
             )
 
@@ -396,9 +420,7 @@ class Contacts:
             value = card.number("VALUE", 0.0)
             if not card.has("VALUE") or card.lines:
                 card.fail("give VALUE; clearances by node are not available")
-            rows = self._flat.surface(card, pair.slave)
-            x = self._flat.points[rows]
-            size = float(np.linalg.norm(np.ptp(x, axis=1), axis=1).mean())
+            size = self._facet_size(pair)
             if abs(value) > 1e-3 * size:
                 card.fail(
                     f"the clearance {value:g} is no small part of the element size {size:.3g}; "
@@ -417,6 +439,7 @@ class Contacts:
         if not card.has("INTERACTION"):
             return None
         family = interaction(card, card.text("INTERACTION"), interactions)
+        note_softness(family, self._flat, self._facet_size(pair), self._report)
         note_thickness(family, self._flat, self._report)
         return friction(family)
 

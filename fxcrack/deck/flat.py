@@ -222,7 +222,25 @@ class Flat:
         """
         if key(name).rpartition(".")[2].isdigit():
             return self._member(card, name, index, "nsets")
-        return self._of_set(*self._resolve(card, name, "nsets", index), "nsets")
+        try:
+            found = self._resolve(card, name, "nsets", index)
+        except DeckError:
+            cells = self._cells_of_name(card, name)
+            if cells is None:
+                raise
+            self._warn_once(
+                f"{card.place}: there is no node set '{name}'; the nodes of the element set of "
+                "this name are meant"
+            )
+            return distinct(self.cells[cells].ravel())
+        return self._of_set(*found, "nsets")
+
+    def _cells_of_name(self, card: Card, name: str) -> Ints | None:
+        """Cells of an element set, ``None`` where there is none."""
+        try:
+            return self._of_set(*self._resolve(card, name, "elsets", None), "elsets")
+        except DeckError:
+            return None
 
     def ordered_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
         """As :meth:`nodes`, in the order of their numbers, or of the deck in UNSORTED sets."""

@@ -10,6 +10,8 @@ from fxcrack.deck.flat import Flat
 from fxcrack.deck.model import Family
 from fxcrack.deck.report import Report
 
+_SOFT = 0.2
+"""Compliance of linear contact over that of the elements, up to which it counts as exact."""
 _COHESIVE = (
     "cohesive zones are not available; a crack along the same interface is *DEBOND with a "
     "*FRACTURE CRITERION"
@@ -37,7 +39,8 @@ def interaction(
     if family.card.number("PAD THICKNESS", 0.0):
         family.card.fail("PAD THICKNESS is not available; move the surfaces apart instead")
     behavior = family.first("SURFACEBEHAVIOR")
-    if behavior is not None and behavior.word("PRESSURE-OVERCLOSURE", "HARD") != "HARD":
+    known = ("HARD",) if explicit else ("HARD", "LINEAR")
+    if behavior is not None and behavior.word("PRESSURE-OVERCLOSURE", "HARD") not in known:
         behavior.fail(
             f"PRESSURE-OVERCLOSURE={behavior.text('PRESSURE-OVERCLOSURE')} is not available; "
             "contact is exact here, PRESSURE-OVERCLOSURE=HARD"
@@ -55,6 +58,40 @@ def interaction(
                 "*SURFACE BEHAVIOR, are not available"
             )
     return family
+
+
+def note_softness(family: Family, flat: Flat, size: float, report: Report) -> None:
+    """Take linear contact that is stiff beside the elements as exact contact.
+
+    Args:
+        family: The interaction.
+        flat: The model.
+        size: Of the slave's facets, length.
+        report: Takes what is replaced.
+
+    Raises:
+        DeckError: It gives way by more than a fifth of what an element does.
+    """
+    card = family.first("SURFACEBEHAVIOR")
+    if card is None or card.word("PRESSURE-OVERCLOSURE", "HARD") != "LINEAR":
+        return
+    stiffness = card.need_rows("the contact stiffness")[0].number(0)
+    elastic = [m.first("ELASTIC") for m in flat.model.materials.values()]
+    moduli = [c.rows()[0].number(0, 0.0) for c in elastic if c is not None and c.lines]
+    if stiffness <= 0.0 or not moduli:
+        card.fail("the contact stiffness must be positive, and bodies elastic")
+    softness = max(moduli) / (stiffness * size)
+    if softness > _SOFT:
+        card.fail(
+            f"PRESSURE-OVERCLOSURE=LINEAR with {stiffness:g} gives way {softness:.2g} times as "
+            "much as an element beside it; softened contact is not available: contact is exact "
+            "here, PRESSURE-OVERCLOSURE=HARD"
+        )
+    report.replace(
+        f"linear contact of stiffness {stiffness:g}, which gives way {softness:.2g} times as much "
+        "as an element beside it, is replaced by exact contact",
+        card,
+    )
 
 
 def friction(family: Family) -> float | None:
@@ -91,4 +128,4 @@ def note_thickness(family: Family, flat: Flat, report: Report) -> None:
                 )
 
 
-__all__ = ["friction", "interaction", "note_thickness"]
+__all__ = ["friction", "interaction", "note_softness", "note_thickness"]

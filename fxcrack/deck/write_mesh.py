@@ -43,6 +43,17 @@ class MeshLines:
         self.dropped = np.zeros(0, dtype=bool)
         self.normals = np.zeros((0, 3))
         self._stacks: Stacks | None = None
+        self._references: dict[tuple[object, ...], int] = {}
+
+    def reference_node(self, mark: tuple[object, ...]) -> tuple[int, bool]:
+        """Number of a node beside those of the mesh, and whether nothing has had it yet.
+
+        Args:
+            mark: What it belongs to.
+        """
+        new = mark not in self._references
+        node = self._references.setdefault(mark, len(self._references) + 1)
+        return node + (0 if self.mesh is None else len(self.mesh.points)), new
 
     @property
     def shell(self) -> bool:
@@ -171,6 +182,17 @@ class MeshLines:
             out += set_lines("ELSET", elset, facets[sides == side, 0], ", INTERNAL")
             lines.append(f'"{elset}", S{side + 1}')
         return [*out, f'*SURFACE, TYPE=ELEMENT, NAME="{name}"', *lines] if lines else []
+
+    def named_surface(self, name: str, where: str | Face) -> list[str]:
+        """A surface of a name; none where the deck has it already."""
+        if isinstance(where, Face):
+            return self.side(name, where)
+        if name == where or self.mesh is None:
+            return []
+        dim, members = self.mesh.groups[where]
+        if members.ndim == 1 or dim != self.scene.mesh.tdim - 1:
+            refuse(f"'{name}' on the edges '{where}' of shells")
+        return self.surface(name, members)
 
     def side(self, name: str, face: Face) -> list[str]:
         """A surface that is a side of shells."""
