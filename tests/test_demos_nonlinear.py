@@ -13,6 +13,7 @@ from specimens import largest_imbalance
 from fxcrack.demos import (
     dynamic_dcb,
     explicit_dcb,
+    impact_panel,
     impact_plate,
     large_dcb,
     plastic_cod,
@@ -136,3 +137,32 @@ def test_a_delamination_grows_above_some_impulse(comm: MPI.Intracomm):
     # that are free, 1e-3 is the opening mode and sweeps that do not settle
     assert grows["spent[bond]"][-1] == pytest.approx(impact_plate.G_IIC, rel=1e-3)
     assert largest_imbalance(grows) < 1e-9
+
+
+@pytest.mark.mpi
+def test_a_panel_under_a_pulse_deflects_as_the_series_of_navier(comm: MPI.Intracomm):
+    history, _ = impact_panel.run(impact_panel.panel(10.0, 5.0, radius=0.0, comm=comm), 2.5e-4, 25)
+    times, w = (impact_panel.values(history, c) for c in ("time", "m[deflection]"))
+    theory = impact_panel.navier(times, 10.0)
+    # 1.3 % with the cells of the demo, half as long
+    assert np.abs(w - theory).max() < 0.04 * theory.max()
+    assert largest_imbalance(history) < 1e-9
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("peak", [10.0, 20.0])
+def test_shells_and_continuum_shells_delaminate_alike_under_impact(peak: float):
+    """Deflection within 1 % of the largest one, grown area within 5 %, which is one cell of it."""
+    scenes = [impact_panel.panel(peak, 2.5, continuum=kind) for kind in (False, True)]
+    shells, solids = (impact_panel.run(scene, 2e-4, 20)[0] for scene in scenes)
+    one, other = (impact_panel.values(h, "m[deflection]") for h in (shells, solids))
+    np.testing.assert_allclose(one, other, atol=0.01 * other.max())
+    grown = [h["area[bond]"][-1] - h["area[bond]"][0] for h in (shells, solids)]
+    if peak < 15.0:
+        assert grown == [0.0, 0.0]
+    else:
+        assert grown[0] == pytest.approx(grown[1], rel=0.05) and grown[0] > 400.0
+        # bonds open in shear alone
+        for history in (shells, solids):
+            assert history["spent[bond]"][-1] == pytest.approx(impact_panel.G_IIC, rel=1e-3)
+    assert max(largest_imbalance(h) for h in (shells, solids)) < 1e-9

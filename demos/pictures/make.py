@@ -41,6 +41,7 @@ FIGURES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "identify_dcb": ("identify_dcb", "resistance.png", ()),
     "large_dcb": ("large_dcb", "load_opening.png", ()),
     "pinch": ("pinch", "pinch.png", ()),
+    "impact_panel": ("impact_panel", "impact_panel.png", ()),
     "shell_accuracy": ("shell_accuracy", "shell_accuracy.png", ()),
     "shell_dcb": ("shell_dcb", "shell_dcb.png", ()),
     "skin_stringer": ("skin_stringer", "skin_stringer.png", ()),

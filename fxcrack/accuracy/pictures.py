@@ -22,7 +22,7 @@ Result = dict[str, Any]
 
 _COLOUR = {
     **{"quadrilateral": 0, "hexahedron": 0, "triangle": 2, "tetrahedron": 2},
-    **{"continuum shell": 2, "shell": 4},
+    **{"continuum shell": 2, "shell": 4, "shell with compliant bonds": 1},
 }
 """Colour of the first order of each shape, the next one that of the second."""
 _PALETTE = (*COLOURS, "#8c6d1f")

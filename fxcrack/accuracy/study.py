@@ -23,11 +23,12 @@ from fxcrack.steps.static import Static
 
 _CELLS = {
     **{"quadrilateral": 2, "triangle": 2, "hexahedron": 3, "tetrahedron": 3},
-    **{"continuum shell": 3, "shell": 2},
+    **{"continuum shell": 3, "shell": 2, "shell with compliant bonds": 2},
 }
 _SHORT = {
     **{"quadrilateral": "quad", "triangle": "tri", "hexahedron": "hex", "tetrahedron": "tet"},
     **{"continuum shell": "continuum shell", "shell": "shell"},
+    **{"shell with compliant bonds": "shell with compliant bonds"},
 }
 _ORDERS = {1: "1st", 2: "2nd"}
 
@@ -40,8 +41,9 @@ class Setting:
         size: Element size along the crack (length).
         order: Order of mesh and displacement, 1 or 2.
         cell: "quadrilateral", "triangle", "hexahedron" or "tetrahedron"; "continuum shell" for
-            hexahedra, or "shell" for quadrilaterals in space, as these elements.
-        method: How G is found: "vcct" or "closure".
+            hexahedra, or "shell" for quadrilaterals in space, as these elements;
+            "shell with compliant bonds" for the latter with the compliance of their arms in bonds.
+        method: How G is found: "vcct", "closure" or "domain".
         stepping: "event", "increment" or "path".
         tolerance: f_tol of increment stepping; ``None`` for the criterion's own.
         solver: How the bodies are condensed: a ``method`` of :class:`fxcrack.CondensedOptions`.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
 import dolfinx.la
@@ -51,6 +51,22 @@ class OperatorChoice:
     name: str
     why: str
     seconds: dict[str, float]
+
+
+class NodeUnknowns(Protocol):
+    """Unknowns of nodes that are not those of the displacement space, one for one with them."""
+
+    def stiffness(self, matrix: PETSc.Mat) -> PETSc.Mat:
+        """Stiffness on the unknowns of that of the space, which is destroyed; collective."""
+        ...
+
+    def nodal(self, values: Array) -> Array:
+        """Values of the owned dofs of the space of those of the unknowns, shape (n_local,)."""
+        ...
+
+    def forces(self, values: Array) -> Array:
+        """Forces on the unknowns of those on the owned dofs of the space, shape (n_local,)."""
+        ...
 
 
 class FurtherNodes:
@@ -136,8 +152,8 @@ class InternalForces:
             temperature that changes in nonlinear bodies.
         choice: Which operator is used; set by :meth:`choose`.
         evaluations: How often forces were evaluated.
-        on_unknowns: Takes the stiffness of linear bodies to other unknowns that :attr:`u` holds;
-            ``None`` where it holds those of the nodes.
+        on_unknowns: What :attr:`u` holds in place of the unknowns of the space; ``None`` where it
+            holds these.
     """
 
     def __init__(self, continuum: Continuum, terms: Sequence[Term]) -> None:
@@ -151,7 +167,7 @@ class InternalForces:
         self._yields = any(t.path_dependent for t in terms)
         self.path_dependent = heated or self._yields
         self.evaluations = 0
-        self.on_unknowns: Callable[[PETSc.Mat], PETSc.Mat] | None = None
+        self.on_unknowns: NodeUnknowns | None = None
         self.choice = OperatorChoice("assembly", "nothing else was chosen", {})
         self._by_cells = [t for t in terms if t.by_cells]
         self._changing = [t for t in terms if not t.constant and _has_state(t)]
@@ -161,6 +177,7 @@ class InternalForces:
         self._blocks: BlockProduct | Product | None = None
         self._further: FurtherNodes | None = None
         self._vector = fem.Function(continuum.space)
+        self._in_space: fem.Function | None = None
         self._evaluate: Callable[[], Array] = self._assembled
 
     # -- operators -----------------------------------------------------------------------
@@ -181,7 +198,7 @@ class InternalForces:
             "assembly": self._assembled,
         }
         if self.on_unknowns is not None:
-            operator, why = "product", "faces of shells have unknowns of their own"
+            operator, why = "product", "nodes of the shells have unknowns of their own"
         elif self.continuum.temperature is not None:
             operator, why = "product", "the temperature of linear bodies is a load"
         else:
@@ -215,7 +232,7 @@ class InternalForces:
         if self._matrix is None:
             matrix = self.continuum.stiffness()
             if self.on_unknowns is not None:
-                matrix = self.on_unknowns(matrix)
+                matrix = self.on_unknowns.stiffness(matrix)
             self._matrix, self._further = local_matrix(self.continuum, matrix)
             matrix.destroy()
         return self._matrix
@@ -241,20 +258,34 @@ class InternalForces:
     def _compile(self) -> None:
         if self._form is None:
             v, comm = ufl.TestFunction(self.continuum.space), self.continuum.comm
-            forms = [t.residual(self.u, v) for t in self.terms if not t.by_cells]
+            u = self._displacement()
+            forms = [t.residual(u, v) for t in self.terms if not t.by_cells]
             self._form = fast_form(comm, sum(forms)) if forms else _NO_FORM
+
+    def _displacement(self) -> fem.Function:
+        """The displacement that terms take, always the same function, up to date; collective."""
+        if self.on_unknowns is None:
+            return self.u
+        if self._in_space is None:
+            self._in_space = fem.Function(self.continuum.space)
+        x, n = self._in_space.x, self.continuum.n_local
+        x.array[:n] = self.on_unknowns.nodal(self.u.x.array[:n])
+        x.scatter_forward()
+        return self._in_space
 
     def _assembled(self) -> Array:
         self._compile()
+        u = self._displacement()
         values = self._vector.x.array
         values[:] = 0.0
         if self._form is not _NO_FORM:
             fem.assemble_vector(values, self._form)
         for term in self._by_cells:
-            term.add_residual(values, self.u)
+            term.add_residual(values, u)
         if self.continuum.comm.size > 1:
             self._vector.x.scatter_reverse(dolfinx.la.InsertMode.add)
-        return np.asarray(values[: self.continuum.n_local])
+        found = np.asarray(values[: self.continuum.n_local])
+        return found if self.on_unknowns is None else self.on_unknowns.forces(found)
 
     # -- states passed -------------------------------------------------------------------
 
@@ -268,7 +299,7 @@ class InternalForces:
         """Keep the state that belongs to the last :meth:`forces`; collective."""
         if self.path_dependent:
             for term in self.terms:
-                term.commit(self.u)
+                term.commit(self._displacement())
 
     def spent(self) -> dict[str, float]:
         """Energies dissipated up to the last commit by name, force x length; collective."""
@@ -307,9 +338,10 @@ class InternalForces:
 
         Components in the order of ``model.stress_labels``, force/length^2.
         """
+        u = self._displacement()
         for term in self._changing:
-            term.update(self.u)
-        return cell_means(self.continuum, [p for t in self.terms for p in t.stresses(self.u)])
+            term.update(u)
+        return cell_means(self.continuum, [p for t in self.terms for p in t.stresses(u)])
 
     # -- forces and energies -------------------------------------------------------------
 
@@ -320,7 +352,7 @@ class InternalForces:
         """
         self.evaluations += 1
         for term in self._changing:
-            term.update(self.u)
+            term.update(self._displacement())
         return self._evaluate()
 
     def tangent_product(self, direction: Array) -> Array:
@@ -365,13 +397,14 @@ class InternalForces:
 
     def stored(self) -> float:
         """Energy stored at :attr:`u`, force times length; collective."""
+        u = self._displacement()
         if not self._energies:
             comm = self.continuum.comm
-            forms = [t.energy(self.u) for t in self.terms if not t.by_cells]
+            forms = [t.energy(u) for t in self.terms if not t.by_cells]
             total = [e for e in forms if e is not None]
             self._energies = {"stored": fast_form(comm, sum(total))} if total else {}
         value = sum(fem.assemble_scalar(form) for form in self._energies.values())
-        value += sum(term.stored(self.u) for term in self._by_cells)
+        value += sum(term.stored(u) for term in self._by_cells)
         return float(self.continuum.comm.allreduce(value, op=MPI.SUM))
 
 
@@ -380,4 +413,4 @@ def _has_state(term: Term) -> bool:
     return bool(term.state())
 
 
-__all__ = ["FurtherNodes", "InternalForces", "OperatorChoice", "local_matrix"]
+__all__ = ["FurtherNodes", "InternalForces", "NodeUnknowns", "OperatorChoice", "local_matrix"]

@@ -50,6 +50,7 @@ from fxcrack.solvers.explicit_fields import MotionFields
 from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_ghosts import GhostMotion
 from fxcrack.solvers.explicit_interface import dynamics_of
+from fxcrack.solvers.explicit_joints import JointForces
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
 from fxcrack.solvers.explicit_moving import MovingInterfaces, sliding_masters
@@ -86,6 +87,7 @@ class ExplicitSolver:
         energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
         dynamics: Motion and forces of the interfaces.
+        joints: Forces at kinks and T joints of shells.
         stability: The stable increment.
         further: Pressures that follow the bodies, bulk viscosity.
         dt: Increment, time.
@@ -117,11 +119,13 @@ class ExplicitSolver:
         following = [t for t in terms if isinstance(t, FollowerPressure)]
         self.bodies = InternalForces(continuum, [t for t in terms if t not in following])
         self.mass = ScaledMass.of(continuum, effect)
-        self.points = points = FacePoints(continuum, pairs, self.mass.values)
-        self.supports = supports = points.supports(supports)
+        self.points = points = FacePoints(
+            continuum, pairs, self.mass.values, self.mass.height, supports
+        )
+        self.supports = supports = points.supports
         self.mass.take_points(points)
         if points.exist:
-            self.bodies.on_unknowns = points.stiffness
+            self.bodies.on_unknowns = points
         self._effect = effect
         self.further = FurtherForces(continuum, following, self.bodies.u)
         self._velocity = points.motion(starting_velocity(continuum, effect.velocity))
@@ -139,7 +143,10 @@ class ExplicitSolver:
         self._make_interfaces()
         self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
         self._owned = self.bodies.u.x.array[: continuum.n_local]  # displacement of the owned dofs
-        chosen = np.concatenate([self._at_interface, self.prescribed.dofs])
+        self.joints = JointForces(continuum, supports, points, self.lumped.nodes.nodes)
+        chosen = np.concatenate([self._at_interface, self.prescribed.dofs, self.joints.free])
+        self._inside = slice(len(self._at_interface), len(chosen) - len(self.joints.free))
+        self._joined = slice(self._inside.stop, len(chosen))
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
         self._ghosts = ghosts = GhostMotion(continuum, self.bodies.u, self._at_interface)
         self.motion = BodyMotion(self.bodies, chosen, ghosts.dofs)
@@ -158,7 +165,7 @@ class ExplicitSolver:
             continuum, self.bodies, self.fronts, self._moving, self._present, self.stability
         )
         self._fields = MotionFields(
-            continuum, self.bodies, self.points, self.lumped, self.dynamics, self.prescribed
+            continuum, self.bodies, points, self.joints, self.lumped, self.dynamics, self.prescribed
         )
         zero = np.zeros(self.lumped.n_rows * continuum.gdim)
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
@@ -214,6 +221,7 @@ class ExplicitSolver:
         self.stable = self.stability.find(self.mass.values, self.velocity)
         self.motion.prepare(self.mass.inverse)
         self._outer.prepare()
+        self.joints.prepare(self.mass.inverse)
         self.dt = chosen_increment(options, self.stable)
         self.timings.add("stable increment", start)
         self.dynamics.open_pairs.penalty = options.penalty if options.contact == "penalty" else None
@@ -297,6 +305,11 @@ class ExplicitSolver:
                 mine = self.lumped.nodes.share(mine.reshape(-1, self.continuum.gdim)).ravel()
             self._at_nodes = mine
             self.accelerate()
+        if self.joints.exist:
+            given = self.prescribed.velocities(self._owned, self._coordinates, self.dt)
+            self.joints.find(
+                chosen[self._joined], self._velocity, self.prescribed.dofs, given, self._h
+            )
         t2 = clock.perf_counter()
         self.seconds["internal forces"] += t1 - t0
         self.seconds["interface"] += t2 - t1
@@ -337,6 +350,7 @@ class ExplicitSolver:
         whole = outer.exist or dt != self.last_dt
         v = self.velocity if whole else self._velocity
         before = v.copy() if whole else v
+        at_joints = v[self.joints.free]
         old = prescribed.velocity(v, dynamics)
         elastic = None
         if dynamics.elastic.exist and dt != self.last_dt:
@@ -346,6 +360,7 @@ class ExplicitSolver:
         self.motion.change_first(v)
         dynamics.advance(h, dt)
         v[prescribed.dofs] = given
+        self.joints.move(v, at_joints, self._at_chosen[self._joined], h)
         if whole and len(at):
             v[at] = dynamics.v[mine].ravel()
         # what neighbours need is on its way during the product
@@ -384,7 +399,9 @@ class ExplicitSolver:
         """Reactions where dofs within the bodies are given velocities, shape (n_dofs,)."""
         prescribed, dofs = self.prescribed, self.prescribed.dofs
         acceleration = (velocities - self._velocity[dofs]) / self._h
-        within = self.mass.values[dofs] * acceleration - self._at_chosen[len(self._at_interface) :]
+        within = self.mass.values[dofs] * acceleration - self._at_chosen[self._inside]
+        if self.joints.exist:
+            within -= self.joints.forces[dofs]
         if not prescribed.holds_nodes:
             return within
         return np.concatenate([within, prescribed.at_nodes(self.lumped, self.dynamics)])
@@ -530,7 +547,7 @@ class ExplicitSolver:
         return self._fields.displacement()
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
-        """Forces of interfaces and supports on the bodies; the caller destroys them.
+        """Forces of interfaces, joints and supports on the bodies; the caller destroys them.
 
         They are what the acceleration needs beyond internal forces and loads, M a - f. Collective,
         between :meth:`begin` and :meth:`finish`, of the present state alone.

@@ -11,6 +11,7 @@ from fxcrack.continuum.internal_forces import InternalForces
 from fxcrack.interface.lumped import LumpedInterface
 from fxcrack.solvers.explicit_energies import sums_over_ranks
 from fxcrack.solvers.explicit_interface import InterfaceDynamics
+from fxcrack.solvers.explicit_joints import JointForces
 from fxcrack.solvers.explicit_points import FacePoints
 from fxcrack.solvers.explicit_supports import PrescribedMotion
 
@@ -22,6 +23,7 @@ class MotionFields:
         continuum: Displacement space.
         bodies: Internal forces, with the displacement.
         points: Faces of shells.
+        joints: Forces at kinks and T joints of shells.
         lumped: Interfaces with lumped masses.
         dynamics: Their motion and forces.
         prescribed: Motion of the supports.
@@ -29,9 +31,10 @@ class MotionFields:
 
     def __init__(
         self, continuum: Continuum, bodies: InternalForces, points: FacePoints,
-        lumped: LumpedInterface, dynamics: InterfaceDynamics, prescribed: PrescribedMotion,
+        joints: JointForces, lumped: LumpedInterface, dynamics: InterfaceDynamics,
+        prescribed: PrescribedMotion,
     ) -> None:  # fmt: skip
-        self._continuum, self._points = continuum, points
+        self._continuum, self._points, self._joints = continuum, points, joints
         self._u = bodies.u.x.array[: continuum.n_local]
         self._lumped, self._dynamics, self._prescribed = lumped, dynamics, prescribed
 
@@ -64,7 +67,9 @@ class MotionFields:
         return self._points.reactions(on_unknowns, n_columns)
 
     def forces(self, at_interface: Ints, at_nodes: Array, reactions: Array) -> PETSc.Vec:
-        """Forces of interfaces and supports on the bodies; collective; the caller destroys them.
+        """Forces of interfaces, joints and supports on the bodies; collective.
+
+        The caller destroys the vector.
 
         Args:
             at_interface: Owned dofs of the interface nodes of this rank, shape (n,).
@@ -79,6 +84,8 @@ class MotionFields:
             mine = lumped.nodes.mine
             held = lumped.mass[mine, None] * self._dynamics.a[mine] - at_nodes[mine]
             values[at_interface] = held.ravel()
+        if self._joints.exist:
+            values += self._joints.forces
         vector.array[:] = self._points.nodal_forces(values)
         return vector
 

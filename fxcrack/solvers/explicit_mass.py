@@ -22,15 +22,21 @@ class ScaledMass:
     Args:
         bare: Lumped mass of the bodies, shape (n_local,), mass.
         enlarged: What of it was added to the inertia of the directors of shells, same shape.
+        height: Height of the mass of the owned nodes of shells above their reference surface, shape
+            (n_nodes,), length.
 
     Attributes:
         values: Present mass, shape (n_local,).
         inverse: One over it, shape (n_local,).
         added: What mass scaling has added, and to directors, shape (n_local,).
         is_scaled: Whether there is any of it.
+        height: As above.
     """
 
-    def __init__(self, bare: Array, enlarged: Array | None = None) -> None:
+    def __init__(
+        self, bare: Array, enlarged: Array | None = None, height: Array | None = None
+    ) -> None:
+        self.height = np.zeros(0) if height is None else height
         self._bare, self._enlarged = bare, np.zeros(len(bare)) if enlarged is None else enlarged
         self.values, self.added = bare.copy(), self._enlarged.copy()
         self.inverse = 1.0 / self.values
@@ -39,7 +45,7 @@ class ScaledMass:
         self._points: FacePoints | None = None
 
     def take_points(self, points: FacePoints) -> None:
-        """Take the unknowns of interfaces of shells; :attr:`added` stays on u and w."""
+        """Take the unknowns of nodes of shells; :attr:`added` stays on u and w."""
         self._points = points if points.exist else None
         self.values = points.masses(self._bare).copy()
         self.inverse = 1.0 / self.values
@@ -91,8 +97,9 @@ class ScaledMass:
             assert options.dt is not None
             if self._points is not None:
                 raise InputError(
-                    "Explicit: mass_scale='dt' is not available beside interfaces of shells; give "
-                    "a number, which scales the mass of all bodies"
+                    "Explicit: mass_scale='dt' is not available beside interfaces of shells and "
+                    "with sections whose mass lies off the mesh; give a number, which scales the "
+                    "mass of all bodies"
                 )
             mass = self._enough_for(options.dt, bodies)
         elif options.mass_scale != 1.0 or self._chosen:

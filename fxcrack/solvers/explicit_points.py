@@ -1,17 +1,22 @@
-"""Unknowns of explicit dynamics at the nodes of shells whose faces meet at interfaces.
+"""Unknowns of explicit dynamics at nodes of shells that have masses of their own.
 
-A point of a face at the distance z from the reference surface moves by d = u + z w, and interfaces
-act on d alone. In place of u and w these nodes have d and a second unknown e that forces on the
-point do not accelerate:
+The mass m of a node of a shell lies at the height c above the reference surface and has the
+inertia j about its centre: its kinetic energy is 1/2 m (u' + c w')^2 + 1/2 j w'^2. Displacement u
+and change w of the director are coupled by it where c is not zero, and where interfaces act on a
+point of a face at the distance z from the reference surface, d = u + z w. In place of u and w these
+nodes have d and a second unknown e that forces on the point do not accelerate:
 
-    u = (1 - z kappa) d - z e,    w = kappa d + e,    kappa = m z/(j + m z^2)
+    u = (1 - z kappa) d - z e,    w = kappa d + e,    kappa = m (z - c)/(j + m (z - c)^2)
 
-with the mass m of u and the inertia j of w. The kinetic energy is 1/2 mu d'^2 + 1/2 nu e'^2 with
+The kinetic energy is 1/2 mu d'^2 + 1/2 nu e'^2 with
 
-    mu = m j/(j + m z^2),    nu = j + m z^2
+    mu = m j/(j + m (z - c)^2),    nu = j + m (z - c)^2
 
-so that 1/mu = 1/m + z^2/j, what a force on the point meets. Masses stay diagonal, and ties, bonds,
-softening, contact and friction of points are those of the nodes of solids with the mass mu.
+so that 1/mu = 1/m + (z - c)^2/j, what a force on the point meets. Masses stay diagonal, and ties,
+bonds, softening, contact and friction of points are those of the nodes of solids with the mass mu.
+
+Nodes of no interface take the centre of their mass as the point, z = c, in which d and e = w are
+uncoupled; in components in which a support holds u and leaves w free they take z = 0, d = u.
 """
 
 from __future__ import annotations
@@ -22,6 +27,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
@@ -35,33 +41,50 @@ _SAME = 1e-9
 
 
 class FacePoints:
-    """Nodes with a point of a face; none in solids.
+    """Nodes whose unknowns are the motion of a point and what is left; none in solids.
 
     Args:
         continuum: Displacement space.
         pairs: Interfaces.
         mass: Lumped mass of u and w, owned dofs, shape (n_local,).
+        height: Height c of the mass of the owned nodes of shells, shape (n_nodes,), length.
+        supports: Prescribed components of u and w.
 
     Raises:
-        InputError: Interfaces are on both faces of a shell at one node.
+        InputError: Interfaces are on both faces of a shell at one node, or a support holds one of u
+            and w of a direction at an interface and leaves the other free.
 
     Attributes:
         local: The nodes that this rank owns, shape (n,).
+        exist: Whether any rank has some.
+        supports: Prescribed components of d and e.
     """
 
-    def __init__(self, continuum: Continuum, pairs: Sequence[Pair], mass: Array) -> None:
+    def __init__(
+        self, continuum: Continuum, pairs: Sequence[Pair], mass: Array, height: Array,
+        supports: Supports,
+    ) -> None:  # fmt: skip
         self._continuum = continuum
         self._layout = layout = continuum.layout
         nodes, z = _points(pairs)
         mine = layout.is_owned(nodes)
-        self.local: Ints = layout.to_local(nodes[mine])
-        self._z = z[mine][:, None]
+        faces: Ints = layout.to_local(nodes[mine])
+        self.local: Ints = np.union1d(faces, np.flatnonzero(height)).astype(np.int64)
+        self.exist = bool(continuum.comm.allreduce(len(self.local) > 0, op=MPI.LOR))
+        self._z = np.zeros((len(self.local), 3))
+        self._on_face = np.isin(self.local, faces)
+        self._given = supports
         if len(self.local):
             m, j = layout.by_node(mass)[self.local][:, [0, 3]].T[..., None]
+            centre = height[self.local][:, None]
+            which = supports.which.reshape(-1, 6)[self.local]
+            pinned = (which[:, :3] >= 0) & (which[:, 3:] < 0)
+            self._z[:] = np.where(pinned, 0.0, centre)
+            self._z[np.searchsorted(self.local, faces)] = z[mine][:, None]
+            self._off = self._z - centre
             self._m, self._j = m, j
-            self._kappa = m * self._z / (j + m * self._z**2)
-        self._matrix: PETSc.Mat | None = None
-        self.exist = bool(len(nodes))
+            self._kappa = m * self._off / (j + m * self._off**2)
+        self.supports = self._prescribed(supports) if self.exist else supports
 
     def _halves(self, values: Any) -> tuple[Any, Any, Any]:
         """A copy by node, and its two halves at the nodes."""
@@ -109,7 +132,7 @@ class FacePoints:
         if not len(self.local):
             return values
         by_node, m, j = self._halves(values)
-        whole = j + m * self._z**2
+        whole = j + m * self._off**2
         return np.asarray(self._put(by_node, m * j / whole, whole))
 
     def stiffness(self, matrix: PETSc.Mat) -> PETSc.Mat:
@@ -121,7 +144,7 @@ class FacePoints:
         for c in range(3):
             u, w = layout.dof(self.local, c), layout.dof(self.local, 3 + c)
             if len(u):
-                z, kappa = self._z[:, 0], self._kappa[:, 0]
+                z, kappa = self._z[:, c], self._kappa[:, c]
                 one[u, u], one[u, w] = 1.0 - z * kappa, -z
                 one[w, u], one[w, w] = kappa, np.ones(len(z))
         rows = sp.csr_matrix(one)
@@ -134,43 +157,56 @@ class FacePoints:
             old.destroy()
         return out
 
-    def supports(self, supports: Supports) -> Supports:
-        """Prescribed d and e of prescribed u and w; collective.
+    def maps(self, local: Ints) -> Array:
+        """What takes d and e to u and w at owned nodes, shape (n, 6, 6)."""
+        out = np.tile(np.eye(6), (len(local), 1, 1))
+        if len(self.local):
+            at = np.minimum(np.searchsorted(self.local, local), len(self.local) - 1)
+            rows = np.flatnonzero(self.local[at] == local)
+            z, kappa = self._z[at[rows]], self._kappa[at[rows]]
+            for c in range(3):
+                out[rows, c, c], out[rows, c, 3 + c] = 1.0 - z[:, c] * kappa[:, c], -z[:, c]
+                out[rows, 3 + c, c] = kappa[:, c]
+        return out
 
-        Raises:
-            InputError: A support holds one of u and w of a direction and leaves the other free.
-        """
-        if not self.exist:
-            return supports
+    def _prescribed(self, supports: Supports) -> Supports:
+        """Prescribed d and e of prescribed u and w; collective."""
         which, on_u, on_w = self._halves(supports.which)
         value, at_u, at_w = self._halves(supports.value)
-        problem = None
-        self._given = supports
         moves = np.array([*(c.moves for c in supports.columns), False])
         at_u, at_w = np.where(moves[on_u], at_u, 0.0), np.where(moves[on_w], at_w, 0.0)
-        alone = (on_u < 0) != (on_w < 0)
         both = (on_u >= 0) & (on_w >= 0)
+        alone = ((on_u >= 0) != (on_w >= 0)) & self._on_face[:, None]
         mixed = both & (on_u != on_w) & (at_u != 0.0) & (at_w != 0.0)
-        if len(self.local) and np.any(alone | mixed):
+        problem = None
+        if np.any(alone | mixed):
             at = np.argwhere(alone | mixed)[0]
             column = max(on_u[tuple(at)], on_w[tuple(at)])
             x = self._continuum.positions()[self.local[at[0]]]
-            problem = (
-                f"Explicit: support '{supports.columns[column].title}' holds displacement or "
-                f"director alone, in {'xyz'[at[1]]}, of a node of an interface near {x.round(6)}; "
-                "hold both there (Clamp, Symmetry), or let the group of the interface's cells end "
-                "before the support"
+            kind = "of a node of an interface" if alone[tuple(at)] else "of a node"
+            where = f"{'xyz'[at[1]]}, {kind} near {x.round(6)}"
+            what = (
+                f"holds displacement or director alone, in {where}; hold both there (Clamp, "
+                "Symmetry), or let the group of the interface's cells end before the support"
+                if alone[tuple(at)]
+                else f"and another one move displacement and director, in {where}, by "
+                "amplitudes of their own, and the mass of the shell lies off the mesh or at an "
+                "interface there; let one of them rest"
             )
+            problem = f"Explicit: support '{supports.columns[column].title}' {what}"
         raise_on_all_ranks(self._continuum.comm, problem)
         if not len(self.local):
             return supports
+        # of two columns the one that moves the node; the other one rests
         column = np.where(at_u == 0.0, np.where(at_w == 0.0, on_u, on_w), on_u)
+        column_d, column_e = np.where(on_u < 0, -1, column), np.where(on_w < 0, -1, column)
+        column_e = np.where(on_u < 0, on_w, column_e)
         d = at_u + self._z * at_w
         e = at_w - self._kappa * d
-        rests = (at_u == 0.0) & (at_w == 0.0)  # any entry of a column whose coordinate is 0
-        d, e = np.where(rests, 1.0, d), np.where(rests, 1.0, e)
+        # any entry of a column whose coordinate is 0
+        d, e = (np.where(moves[c], x, 1.0) for c, x in ((column_d, d), (column_e, e)))
         return replace(
-            supports, which=self._put(which, column, column), value=self._put(value, d, e)
+            supports, which=self._put(which, column_d, column_e), value=self._put(value, d, e)
         )
 
     def reactions(self, on_unknowns: Array, n_columns: int) -> Array:

@@ -41,24 +41,18 @@ def inertia_of(effects: Sequence[Any]) -> Inertia:
     return effect
 
 
-def _check_shells(shell: ShellBodies, interfaces: Sequence[Interface]) -> None:
-    """Refuse what couples the masses of shells at different nodes.
+def _check_shells(interfaces: Sequence[Interface]) -> None:
+    """Refuse interfaces between shells that explicit dynamics does not have.
 
     Raises:
-        InputError: Says what, and what to do instead.
+        InputError: Says which, and what to do instead.
     """
-    instead = "use a Dynamic step, or ContinuumShell on hexahedra of first order"
     for interface in interfaces:
         if interface.stiffness is not None:
             raise InputError(
                 f"Explicit: interface '{interface.title}' between shells has bonds with a "
                 "stiffness; leave stiffness out, exact bonds take no increment"
             )
-    if shell.order == 1 and len(shell.layout.joints.nodes):
-        raise InputError(
-            "Explicit: the surface has kinks or T joints, where nodes of several parts move "
-            f"together, which explicit dynamics of shells does not have; {instead}"
-        )
 
 
 def check_large_rotation(
@@ -91,7 +85,7 @@ def check_bodies(
         InputError: Says which, and what to do instead.
     """
     if isinstance(continuum, ShellBodies):
-        _check_shells(continuum, interfaces)
+        _check_shells(interfaces)
     if continuum.layout.shared:
         raise InputError(
             "Explicit: the strain out of the plane in GeneralisedPlaneStrain has no mass that "
@@ -187,8 +181,8 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
         if interface.stiffness == "arms":
             raise InputError(
                 f"interface '{interface.title}': stiffness='arms' is that of shells on surface "
-                "meshes, whose interfaces Explicit does not have; give 'auto' or three numbers per "
-                "area"
+                "meshes, whose bonds are exact in Explicit; leave stiffness out there, and give "
+                "'auto' or three numbers per area between solids"
             )
         if interface.pairing == "surface-to-surface":
             raise InputError(
