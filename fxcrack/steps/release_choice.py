@@ -73,9 +73,9 @@ def _why_at_once(debond: Debond, step: Step, pairs: Sequence[Pair]) -> str:
         return "onset by method='closure'"
     if isinstance(step, Static) and step.stepping == "opening":
         return "stepping='opening'"
-    statics = isinstance(step, Static) and not isinstance(step, Dynamic)
     at_any_f = debond.criterion.unstable_tolerance is not None
-    if at_any_f and statics and step.stepping == "increment":
+    in_motion = isinstance(step, Dynamic)
+    if at_any_f and not in_motion and isinstance(step, Static) and step.stepping == "increment":
         # a bond that softens sheds its load as the load grows on, so that a front advances by a
         # row per increment at most, at any f that is allowed; bonds that go at once catch up
         return "unstable_tolerance in stepping='increment'"
