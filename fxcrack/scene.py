@@ -43,12 +43,13 @@ from fxcrack.step_run import check_step, checked_observers, run_step
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.cycles import Cycles
-from fxcrack.steps.debond import Debond, check_friction
+from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_rules import check_interfaces, check_start, warn_of_step_release
 from fxcrack.steps.explicit_setup import paired_by_nodes, start_from, use_explicit_solver
+from fxcrack.steps.release_choice import check_friction
 from fxcrack.steps.rows import Observer
 from fxcrack.steps.static import Static
 

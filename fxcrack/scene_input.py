@@ -61,7 +61,8 @@ from fxcrack.solvers.linear import LinearSolver
 from fxcrack.solvers.newton import NewtonSolver
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.steps.analysis import Analysis, EnergyBalance
-from fxcrack.steps.debond import Debond, check_friction
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.release_choice import check_friction
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -144,7 +144,7 @@ def run_step(
     """
     may_grow = [d in chosen for d in analysis.debonds]
     may_grow += [False] * (len(analysis.pairs) - len(analysis.debonds))
-    analysis.activate(chosen)
+    analysis.activate(chosen, step)
     for g in analysis.active:
         # without a bonded set the scene has said so already
         if g.debond.interface.bonded is not None and not len(g.tips()):

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 import pytest
 
 import fxcrack as fx
-from fxcrack.criteria import ProgressiveRelease
 from fxcrack.deck.cards import DeckError
 from fxcrack.meshes.dcb import dcb_2d
 from tests.decks import BONDED, PLATE, read, write
@@ -102,14 +99,6 @@ def test_kinematic_couplings_in_explicit_decks(tmp_path):
         c for c in found.columns if c.startswith("R[") and c.endswith("y]") and "21" not in c
     )
     assert found[column] == pytest.approx(reaction, rel=1e-10, abs=1e-10 * np.abs(reaction).max())
-
-
-def test_a_law_that_was_not_chosen_stays_so_on_other_ranks_and_in_copies():
-    bond = fx.Interface("a", "b", bonded=lambda x: x[0] > 0.0)
-    debond = copy.deepcopy(fx.Debond(bond, fx.VCCT(0.5)))
-    assert not debond.release_chosen and debond.release == fx.StepRelease()
-    chosen = copy.deepcopy(fx.Debond(bond, fx.VCCT(0.5), ProgressiveRelease()))
-    assert chosen.release_chosen and chosen.release == ProgressiveRelease()
 
 
 def test_controls_of_the_step(tmp_path):

@@ -345,7 +345,8 @@ def test_solid_arms_by_parts_in_two_steps(tmp_path):
         "Upper.Face", "Lower.Face", bonded=lambda x: x[0] > 9.0, contact=True, gap="keep",
         name="Upper.Face",
     )  # fmt: skip
-    debond = fx.Debond(bond, fx.VCCT(0.5, 1.5, mix=fx.BK(2.0), unstable_tolerance=np.inf))
+    criterion = fx.VCCT(0.5, 1.5, mix=fx.BK(2.0), unstable_tolerance=np.inf)
+    debond = fx.Debond(bond, criterion, fx.StepRelease())  # that of the deck
     by_hand = fx.Scene(
         deck.scene.mesh,
         materials=fx.Isotropic(210e3, 0.3),

@@ -266,7 +266,7 @@ def test_arms_of_shells_come_apart_as_in_python(shared_path):
         supports=[
             fx.Clamp("FAR"), fx.Displacement("TIPUP", z=1.0), fx.Displacement("TIPLOW", z=-1.0),
         ],
-        debonds=[fx.Debond(bond, fx.VCCT(1.0, 2.0, mix=fx.BK(2.0)))],
+        debonds=[fx.Debond(bond, fx.VCCT(1.0, 2.0, mix=fx.BK(2.0)), fx.StepRelease())],
     )  # fmt: skip
     wanted = by_hand.run(deck.steps[0].step)
     found = deck.run()

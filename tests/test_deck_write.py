@@ -108,7 +108,20 @@ def test_second_order_and_solid_elements(tmp_path, mesh, model):
     )
     held = [fx.Displacement("far_upper", z=0.0), fx.Displacement("far_lower", z=0.0)]
     supports = PINS + (held if isinstance(model, fx.Solid) else [])
-    round_trip(tmp_path / "a.inp", scene(mesh(), model=model, supports=supports), [step])
+    one = scene(mesh(), release=fx.StepRelease(), model=model, supports=supports)
+    round_trip(tmp_path / "a.inp", one, [step])
+
+
+def test_a_default_that_a_deck_does_not_have_is_said(tmp_path, caplog):
+    mesh = dcb_3d(length=60.0, dx=10.0, dy=20.0, ny=1)
+    for release, said in ((fx.StepRelease(), 0), (None, 1)):
+        one = scene(mesh, release=release, model=fx.Solid())
+        fx.write_deck(one, [INCREMENTS], tmp_path / "a.inp")
+        assert caplog.text.count("released progressively by default") == said
+        assert fx.read_deck(tmp_path / "a.inp").scene.debonds[0].release == fx.StepRelease()
+    with pytest.raises(fx.InputError, match="the release law Progressive"):
+        one = scene(mesh, release=fx.ProgressiveRelease(), model=fx.Solid())
+        fx.write_deck(one, [INCREMENTS], tmp_path / "a.inp")
 
 
 def test_cycles_loads_and_materials(tmp_path):

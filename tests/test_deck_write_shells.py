@@ -40,7 +40,11 @@ def arms(comm, *, element, upper, lower):
             fx.Rotation("upper_a0", x=0.0),
         ],
         loads=[fx.Pressure(fx.Face("upper", "top"), 1e-3, name="wind")],
-        debonds=[fx.Debond(bond(30.0), fx.VCCT(0.17, 0.5, mix=fx.BK(1.7), tolerance=0.5))],
+        debonds=[
+            fx.Debond(
+                bond(30.0), fx.VCCT(0.17, 0.5, mix=fx.BK(1.7), tolerance=0.5), fx.StepRelease()
+            )
+        ],
     )
 
 
@@ -116,7 +120,11 @@ def dcb(order, *, upper, lower):
         model=fx.Solid(),
         materials={"upper": upper, "lower": lower},
         supports=delta + held,
-        debonds=[fx.Debond(interface, fx.VCCT(0.17, 0.5, mix=fx.BK(1.7), tolerance=0.5))],
+        debonds=[
+            fx.Debond(
+                interface, fx.VCCT(0.17, 0.5, mix=fx.BK(1.7), tolerance=0.5), fx.StepRelease()
+            )
+        ],
     )
 
 

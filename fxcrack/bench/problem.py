@@ -17,7 +17,7 @@ from fxcrack.condensation.options import CondensedOptions
 from fxcrack.continuum.kinematics import PlaneStrain, Solid
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.materials import Isotropic
-from fxcrack.criteria import VCCT
+from fxcrack.criteria import VCCT, StepRelease
 from fxcrack.history import Row
 from fxcrack.interface.definition import Interface
 from fxcrack.mesh import Mesh
@@ -122,7 +122,8 @@ class Problem:
             materials=Isotropic(_E, _NU),
             model=Solid() if self.is_3d else PlaneStrain(),
             supports=supports,
-            debonds=[Debond(bond, VCCT(GIc=_GC))],
+            # node by node, as the programs and baselines it is compared with
+            debonds=[Debond(bond, VCCT(GIc=_GC), StepRelease())],
             options=options,
         )
 

@@ -99,12 +99,12 @@ def _linear(largest: npt.ArrayLike, final: float) -> Array:
 class StepRelease(ReleaseLaw):
     """The whole force is removed in the increment that follows debonding.
 
-    On a front in 3-D this loses energy: a single node that runs ahead of its neighbours is released
-    when its own f is 1, and the energy set free per area stays below the toughness. A double
-    cantilever beam 20 wide with elements of 1 x 2 carries 14 % less load at the same opening than
-    corrected beam theory, whatever the spacing across; with :class:`ProgressiveRelease` it is
-    1.7 % more, of which the bending stiffness of first-order elements is the most (demo
-    ``front3d``). In 2-D the load at every onset is right.
+    The default in 2-D, where the load at every onset is right. On a front in 3-D it loses energy: a
+    single node that runs ahead of its neighbours is released when its own f is 1, and the energy
+    set free per area stays below the toughness. A double cantilever beam 20 wide with elements of
+    1 x 2 carries 14 % less load at the same opening than corrected beam theory, whatever the
+    spacing across; with :class:`ProgressiveRelease`, the default in 3-D, it is 1.7 % more, of which
+    the bending stiffness of first-order elements is the most (demo ``front3d``).
     """
 
     driver: ClassVar[Driver] = "once"
@@ -160,7 +160,8 @@ class ProgressiveRelease(ReleaseLaw):
     """The force falls linearly with opening so that exactly the toughness is dissipated.
 
     The front moves continuously through an element: no saw-tooth, no dependence of the energy on
-    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A divided by the size of F0.
+    the mesh. Damage is irreversible; the force ends at w_f = 2 G_c A divided by the size of F0. The
+    default in 3-D and in :class:`fxcrack.Explicit` steps.
 
     Attributes:
         zone: Elements over which a bond softens, 1 or 2. With 2 softening begins at f = 1/2 and

@@ -27,6 +27,7 @@ from fxcrack.deck.gather import Gathered, gather
 from fxcrack.deck.lines import number
 from fxcrack.deck.procedures import DeckStep
 from fxcrack.deck.write_conditions import ConditionLines
+from fxcrack.deck.write_debond import debond_lines
 from fxcrack.deck.write_interfaces import InterfaceLines, nodal_toughness
 from fxcrack.deck.write_mesh import MeshLines
 from fxcrack.deck.write_properties import material_lines
@@ -192,7 +193,8 @@ class _Writer:
             if explicit and not grows:
                 refuse(f"step '{step.name}', in which '{debond.interface.title}' may not grow")
             if grows and not explicit:
-                out += interfaces.debond(debond, self.toughness[i] is not None)
+                nodal = self.toughness[i] is not None
+                out += debond_lines(debond, step.step, self.scene.pairs, nodal=nodal)
         monitors = [line for m in self.scene.input.monitors for line in self._monitor(m)]
         if monitors:
             out += ["*OUTPUT, HISTORY", *monitors]

@@ -1,4 +1,4 @@
-"""Interfaces of a scene as cards of a deck: surfaces, contact pairs, ties, bonds, ``*DEBOND``."""
+"""Interfaces of a scene as cards of a deck: surfaces, contact pairs, ties, bonds."""
 
 from __future__ import annotations
 
@@ -8,19 +8,10 @@ from scipy.spatial import cKDTree
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.face import Face
-from fxcrack.criteria import (
-    AmplitudeRelease,
-    CrackLengthVsTime,
-    CrackOpening,
-    CriticalStress,
-    RampRelease,
-    StepRelease,
-)
 from fxcrack.deck.gather import Gathered
-from fxcrack.deck.lines import broken, number, set_lines
+from fxcrack.deck.lines import number, set_lines
 from fxcrack.deck.write_explicit import explicit_interface
 from fxcrack.deck.write_mesh import MeshLines
-from fxcrack.deck.write_properties import criterion_lines
 from fxcrack.deck.write_rigid import rigid_lines
 from fxcrack.deck.write_steps import refuse
 from fxcrack.interface.definition import Interface
@@ -143,7 +134,7 @@ class InterfaceLines:
         found = explicit_interface(
             interface,
             None if debond is None else debond.criterion,
-            debond.release if debond is not None and debond.release_chosen else None,
+            None if debond is None else debond.release,
             bonded=bool(pair.bonded.any()),
             nodal=at is not None and self.toughness[at] is not None,
             thickness=self._thickness(),
@@ -173,25 +164,6 @@ class InterfaceLines:
         gdim = self.mesh.points.shape[1]
         _, at = cKDTree(points).query(pair.surface.x[chosen][:, :gdim])
         return np.asarray(nodes[at])
-
-    def debond(self, debond: Debond, nodal: bool) -> list[str]:
-        """Cards of a debond in a step."""
-        title, release = debond.interface.title, debond.release
-        head = f'*DEBOND, SLAVE="{title}", MASTER="{title} master", FREQUENCY=1'
-        lines: list[str] = []
-        old = isinstance(debond.criterion, CriticalStress | CrackOpening | CrackLengthVsTime)
-        if isinstance(release, AmplitudeRelease):
-            pairs = zip(release.times, release.fractions, strict=True)
-            lines = broken([number(x) for pair in pairs for x in pair], 8, comma=False)
-            if release.first_increment is not None:
-                head += f", TIME INCREMENT={number(release.first_increment)}"
-        elif isinstance(release, RampRelease) and release.increments is None and not old:
-            head += ", DEBONDING FORCE=RAMP"
-        elif not isinstance(release, StepRelease):
-            refuse(f"interface '{title}': the release law {release}")
-        if debond.temperature is not None or debond.watch:
-            refuse(f"interface '{title}': temperature= and watch= of a Debond")
-        return [head, *lines, *criterion_lines(title, debond.criterion, nodal)]
 
 
 def _type(interface: Interface) -> str:

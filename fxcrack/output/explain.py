@@ -111,8 +111,13 @@ def explain(source: Analysis | HasAnalysis) -> Explanation:
     plan = analysis.plan
     seconds = dict(solver.timings.seconds)
     groups = tuple(str(cells) for cells in analysis.continuum.shell_cells.values())
+    notes = tuple(
+        f"release of '{g.title}': {type(g.law).__name__}"
+        + ("" if g.debond.release_chosen else ", by default")
+        for g in analysis.cracks
+    )
     return Explanation(
-        plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, groups
+        plan.solver, plan.why, plan.effects, unknowns, counts, seconds, costs, groups, notes
     )
 
 

@@ -45,7 +45,7 @@ def fingerprint(analysis: Analysis, step: Any, grow: list[bool]) -> dict[str, An
             debond = crack.debond
             parts["criterion"] = plain(debond.criterion)
             parts["toughness"] = plain(crack.evaluator.toughness)
-            parts["release"] = plain(debond.release)
+            parts["release"] = plain(crack.law)
             parts["watch"] = plain(list(debond.watch))
             parts["grows"] = grow[p]
         interfaces[pair.title] = parts

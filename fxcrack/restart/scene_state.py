@@ -178,7 +178,7 @@ def _ramp_of(analysis: Analysis, i: int, known: dict[str, Any], arrays: Arrays) 
         if f"ramp.{f.name}[{i}]" in arrays:
             values[f.name] = arrays[f"ramp.{f.name}[{i}]"]
         elif f.name == "law":
-            values["law"] = analysis.cracks[known["p"]].debond.release
+            values["law"] = analysis.cracks[known["p"]].law
     ramp: ForceRamp = kind(**values)
     return ramp
 

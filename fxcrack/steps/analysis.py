@@ -37,6 +37,7 @@ from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import FatigueState
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.force_ramps import ForceRamp, given_forces, still_pulling
+from fxcrack.steps.release_choice import Step, choose_release
 
 _ROUND_OFF = 1e-10
 """Overlap of faces over the size of their facets that is round-off of coordinates."""
@@ -110,7 +111,7 @@ class Analysis:
         fatigue: What cycles leave behind for later ones.
         started: Whether there is an equilibrium yet.
         stabilise: The weak foundation of bodies, as the user gave it.
-        said: What was warned of at the end of a step, each once.
+        said: What was said of the scene, each once.
     """
 
     continuum: Continuum
@@ -273,16 +274,33 @@ class Analysis:
 
     # -- cracks and tips -----------------------------------------------------------------
 
-    def activate(self, chosen: Sequence[Debond]) -> None:
-        """Let some debonds grow from now on; all cracks are made before the first step begins.
+    def activate(self, chosen: Sequence[Debond], step: Step) -> None:
+        """Let some debonds grow in a step; all cracks are made before the first step begins.
 
         Collective.
 
         Raises:
             InputError: A criterion does not fit its interface.
         """
+        choices = [choose_release(d, step, self.pairs) for d in self.debonds]
         if not self.started:
-            self.cracks = [Crack(self.solver, p, d) for p, d in enumerate(self.debonds)]
+            self.cracks = [
+                Crack(self.solver, p, debond, choices[p].law)
+                for p, debond in enumerate(self.debonds)
+            ]
+        for g, choice in zip(self.cracks, choices, strict=True):
+            g.release_by(choice.law)
+            if (
+                choice.why_at_once
+                and g.debond in chosen
+                and f"release of {g.title}" not in self.said
+            ):
+                self.said.add(f"release of {g.title}")
+                log.info(
+                    "interface '%s': bonds are released at once (StepRelease); the default in 3-D, "
+                    "progressive release, is not possible with %s",
+                    g.title, choice.why_at_once,
+                )  # fmt: skip
         self.active = [g for g in self.cracks if g.debond in chosen]
         self.tip_values = []
 

@@ -10,7 +10,7 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.checks import format_point
 from fxcrack.base.errors import InputError
-from fxcrack.criteria import Criterion
+from fxcrack.criteria import Criterion, ReleaseLaw
 from fxcrack.criteria.evaluator import (
     Evaluator,
     SofteningEvaluator,
@@ -27,7 +27,8 @@ from fxcrack.interface.surface_paths import SurfacePaths
 from fxcrack.interface.tips import Tips
 from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.bond_records import ReleaseRecord, release_records
-from fxcrack.steps.debond import Debond, softens
+from fxcrack.steps.debond import Debond
+from fxcrack.steps.release_choice import softens
 
 _TIE = 1e-6
 """Front nodes whose f lies within this fraction of the largest one are released together."""
@@ -43,35 +44,52 @@ class Crack:
         solver: The model.
         p: Number of the pair.
         debond: Interface and criterion.
+        law: How its bonds are released in the first step.
 
     Attributes:
+        law: How its bonds are released in the present step.
         probe: The interface as the criterion sees it.
         n_released: Nodes released so far.
         records: What is known of every release, in order.
         paths: Where tips come from.
     """
 
-    def __init__(self, solver: AnySolver, p: int, debond: Debond) -> None:
+    def __init__(self, solver: AnySolver, p: int, debond: Debond, law: ReleaseLaw) -> None:
         self.solver = solver
         self.p = p
         self.title = debond.interface.title
         self.debond = debond
         self.criterion = debond.criterion
+        self.law = law
         self.front = solver.fronts[p]
         self.extent = CrackExtent(self.front)
         self.probe: FrontProbe = solver.probe(p)
         self.evaluator, *self.watched = (
             make_evaluator(
-                solver, self.probe, debond, c, softens=c is debond.criterion and softens(debond)
+                solver, self.probe, debond, c,
+                softens=c is debond.criterion and softens(debond, law),
             )
             for c in (debond.criterion, *debond.watch)
-        )
-        every = [self.evaluator, *self.watched]
-        solver.around[p] = (max(e.ahead for e in every), max(e.behind for e in every))
+        )  # fmt: skip
+        self._tell_reach()
         self.n_released = 0
         self.records: list[ReleaseRecord] = []
         self.paths = SurfacePaths(self.front)
         self._may_overlap = not debond.interface.contact
+
+    def release_by(self, law: ReleaseLaw) -> None:
+        """Release bonds by a law from now on; collective."""
+        before, self.law = self.opening_driven, law
+        if self.opening_driven != before:
+            self.evaluator = make_evaluator(
+                self.solver, self.probe, self.debond, self.criterion, softens=self.opening_driven
+            )
+            self._tell_reach()
+
+    def _tell_reach(self) -> None:
+        """Let the solver know how many nodes around a tip are evaluated."""
+        every = [self.evaluator, *self.watched]
+        self.solver.around[self.p] = (max(e.ahead for e in every), max(e.behind for e in every))
 
     @property
     def released(self) -> list[tuple[int, float]]:
@@ -173,7 +191,7 @@ class Crack:
     @property
     def opening_driven(self) -> bool:
         """Whether bond forces fall with their opening."""
-        return softens(self.debond)
+        return softens(self.debond, self.law)
 
     def nodes_of(self, values: TipValues, chosen: Ints) -> Ints:
         """Nodes to release where some tips are chosen: where bonds soften, by whole units.
@@ -201,7 +219,7 @@ class Crack:
             nodes: Slave nodes that are released now, shape (n,).
             values: Values of the criterion at the front they are part of.
         """
-        return self._softening.to_soften(nodes, values, self.debond.release)
+        return _joined(self._softening.to_soften(nodes, values, self.law), values)
 
     @property
     def _softening(self) -> SofteningEvaluator:
@@ -212,6 +230,33 @@ class Crack:
         """Record slave nodes that are about to be released, shape (n,)."""
         self.n_released += len(nodes)
         self.records += release_records(self, nodes, values, state, time)
+
+
+def _joined(units: list[CohesiveUnit], values: TipValues) -> list[CohesiveUnit]:
+    """Units that are equally critical, as mirror images or along a front in plane strain, as one.
+
+    Each by a law of its own, one of them would open before the others wherever bonds run through
+    unstable states, and round-off would decide which.
+
+    Args:
+        units: Units that are released now.
+        values: Values of the criterion at the front.
+    """
+    f_of = dict(zip(values.tips.node.tolist(), values.f.tolist(), strict=True))
+    f = [max((f_of[n] for n in unit.nodes.tolist() if n in f_of), default=0.0) for unit in units]
+    out: list[CohesiveUnit] = []
+    level = np.inf
+    for i in np.argsort(-np.array(f), kind="stable"):
+        unit = units[i]
+        if out and f[i] >= level * (1.0 - _TIE) and unit.pressed == out[-1].pressed:
+            last = out.pop()
+            nodes = np.union1d(last.nodes, unit.nodes)
+            energy, area = last.energy + unit.energy, last.area + unit.area
+            out.append(CohesiveUnit(nodes, energy, unit.pressed, area))
+        else:
+            level = f[i]
+            out.append(unit)
+    return out
 
 
 def _named_apart(

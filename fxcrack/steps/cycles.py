@@ -182,7 +182,7 @@ def check_criteria(step: Static | Cycles | Explicit, debonds: Sequence[Debond]) 
                 "in cycles: use Fatigue, or leave it out of this step, grow=[other debonds]; it "
                 "stays tied then"
             )
-        if debond.release.driver != "once":
+        if debond.release is not None and debond.release.driver != "once":
             raise InputError(
                 f"{who}: in cycles bonds are released at once; use release=StepRelease() (the "
                 f"default) instead of {type(debond.release).__name__}"

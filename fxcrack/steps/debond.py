@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy.typing as npt
 
@@ -19,12 +18,8 @@ from fxcrack.base.checks import (
     shown,
 )
 from fxcrack.base.errors import InputError
-from fxcrack.criteria import Criterion, ReleaseLaw, StepRelease, release_laws
+from fxcrack.criteria import Criterion, ReleaseLaw, release_laws
 from fxcrack.interface.definition import Interface
-from fxcrack.interface.pair import Pair
-
-_BY_DEFAULT = StepRelease()
-"""The law of debonds that name none; told from one that was chosen by identity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +29,12 @@ class Debond:
     Args:
         interface: Where.
         criterion: When.
-        release: How the bond force goes to zero; by default at once (:class:`StepRelease`), in an
-            :class:`fxcrack.Explicit` step progressively. In 3-D prefer
-            :class:`ProgressiveRelease` unless friction excludes it: see :class:`StepRelease` for
-            what releasing at once costs there.
+        release: How the bond force goes to zero. By default progressively in 3-D and in
+            :class:`fxcrack.Explicit` steps (:class:`ProgressiveRelease`), at once in the plane
+            (:class:`StepRelease`); at once in 3-D, too, with criteria that know no toughness, with
+            :class:`Fatigue`, and where progressive release is not possible: beside friction, with
+            ``method="closure"`` or ``"domain"``, with ``stepping="opening"``, with
+            ``unstable_tolerance`` in increments.
         temperature: Temperature of the interface, a number or a function of positions of shape
             (3, n), for toughness, strength or critical opening tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.
@@ -45,25 +42,14 @@ class Debond:
 
     interface: Interface
     criterion: Criterion
-    release: ReleaseLaw = _BY_DEFAULT
+    release: ReleaseLaw | None = None
     watch: Sequence[Criterion] = ()
     temperature: float | Callable[[Array], npt.ArrayLike] | None = None
 
     @property
     def release_chosen(self) -> bool:
         """Whether the release law was named, and is not the default."""
-        return self.release is not _BY_DEFAULT
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What is copied or sent to other ranks: a law that was not named stays unnamed."""
-        state = dict(self.__dict__)
-        if not self.release_chosen:
-            del state["release"]
-        return state
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Take what :meth:`__getstate__` gave."""
-        self.__dict__.update({"release": _BY_DEFAULT} | state)
+        return self.release is not None
 
     def __post_init__(self) -> None:
         """Refuse what no model could make right."""
@@ -78,23 +64,12 @@ class Debond:
             number_or_function(f"Debond of {where}", "temperature", self.temperature)
         for criterion in (self.criterion, *self.watch):
             check_criterion(where, criterion)
-        missing = missing_members(self.release, ReleaseLaw)
-        if missing:
-            raise InputError(
-                f"{where}: release = {shown(self.release)} is no release law ({missing}); give "
-                "StepRelease(), ProgressiveRelease(), RampRelease(), AmplitudeRelease(...) or a "
-                "class derived from ReleaseLaw"
-            )
-        possible = self.criterion.release_drivers
-        if self.release.driver not in possible:
-            raise InputError(
-                f"{where}: {type(self.release).__name__} is not possible with "
-                f"{type(self.criterion).__name__}"
-                f"{'' if self.criterion.knows_toughness else ', which knows no toughness'}; use "
-                f"{release_laws.names_of(possible)}"
-            )
-        gradual = self.release.driver != "once" or self.criterion.softens
-        if gradual and any(c.needs_free_faces for c in (self.criterion, *self.watch)):
+        if self.release is not None:
+            self._check_release(where, self.release)
+        named = self.release is not None and self.release.driver != "once"
+        if (named or self.criterion.softens) and any(
+            c.needs_free_faces for c in (self.criterion, *self.watch)
+        ):
             raise InputError(
                 f"{where}: method='domain' needs crack faces without bond forces, which a gradual "
                 "release leaves behind the tip; use StepRelease() (and VCCT), or method='vcct' or "
@@ -107,6 +82,24 @@ class Debond:
             self.criterion.check_bond(normal_only=self.interface.normal_only and not waived)
         except InputError as error:
             raise InputError(f"{where}: {error}") from error
+
+    def _check_release(self, where: str, release: ReleaseLaw) -> None:
+        """Refuse what is no release law, and one that the criterion does not have."""
+        missing = missing_members(release, ReleaseLaw)
+        if missing:
+            raise InputError(
+                f"{where}: release = {shown(release)} is no release law ({missing}); give "
+                "StepRelease(), ProgressiveRelease(), RampRelease(), AmplitudeRelease(...) or a "
+                "class derived from ReleaseLaw"
+            )
+        possible = self.criterion.release_drivers
+        if release.driver not in possible:
+            raise InputError(
+                f"{where}: {type(release).__name__} is not possible with "
+                f"{type(self.criterion).__name__}"
+                f"{'' if self.criterion.knows_toughness else ', which knows no toughness'}; use "
+                f"{release_laws.names_of(possible)}"
+            )
 
     def _check_rigid(self, where: str) -> None:
         """Refuse criteria that a rigid master does not have."""
@@ -151,25 +144,3 @@ def check_criterion(where: str, criterion: Criterion) -> None:
     for name in ("degree", "unstable_tolerance"):
         if getattr(criterion, name) is not None:
             number(owner, name, getattr(criterion, name))
-
-
-def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
-    """Refuse bonds that soften with their opening beside friction, but for explicit dynamics.
-
-    Raises:
-        InputError: A debond has such a release law.
-    """
-    rough = [pair.title for pair in pairs if pair.friction is not None]
-    for debond in debonds:
-        if rough and softens(debond):
-            raise InputError(
-                f"interface '{debond.interface.title}' is released progressively with its opening, "
-                f"which is not possible beside friction (interface '{rough[0]}') but in explicit "
-                "dynamics; use StepRelease(), RampRelease(increments=...) or "
-                "AmplitudeRelease(...), leave friction out, or take an Explicit step"
-            )
-
-
-def softens(debond: Debond) -> bool:
-    """Whether bond forces fall with their opening."""
-    return debond.release.driver == "opening" or debond.criterion.softens

@@ -13,7 +13,7 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.sparse import Product
-from fxcrack.criteria import ProgressiveRelease, ReleaseLaw
+from fxcrack.criteria import ProgressiveRelease
 from fxcrack.criteria.closure_lengths import uneven
 from fxcrack.criteria.crack_closure import closure_weights
 from fxcrack.criteria.energy_release import RateCriterion
@@ -25,17 +25,11 @@ from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.explicit_bonds import Fading
 from fxcrack.solvers.explicit_interface import ChosenBonds
 from fxcrack.steps.crack import Crack
-from fxcrack.steps.debond import Debond
 
 _TIE = 1e-6
 """Front nodes whose f lies within this fraction below the onset go together with those above."""
 _CLOSE = 0.999
 """Part of the bound below which f is surely below the onset, round-off included."""
-
-
-def law_of(debond: Debond) -> ReleaseLaw:
-    """The release law in explicit dynamics: progressive unless one was chosen."""
-    return debond.release if debond.release_chosen else ProgressiveRelease()
 
 
 @dataclass(frozen=True)
@@ -67,7 +61,7 @@ class ReleaseControl:
 
     def __init__(self, solver: ExplicitSolver, crack: Crack) -> None:
         self._solver, self._crack = solver, crack
-        self.law = law_of(crack.debond)
+        self.law = crack.law
         self.onset = self.law.onset if isinstance(self.law, ProgressiveRelease) else 1.0
         self._screen: _Screen | None = None
 
@@ -185,4 +179,4 @@ def _softening(evaluator: object) -> SofteningEvaluator:
     return evaluator  # type: ignore[return-value]
 
 
-__all__ = ["ReleaseControl", "law_of"]
+__all__ = ["ReleaseControl"]

@@ -16,7 +16,7 @@ from fxcrack.criteria import VCCT
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.definition import Interface
 from fxcrack.steps.debond import Debond
-from fxcrack.steps.explicit_release import law_of
+from fxcrack.steps.release_choice import explicit_law
 
 
 def inertia_of(effects: Sequence[Any]) -> Inertia:
@@ -167,7 +167,7 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 f"{where}: mode_length is not available in explicit dynamics, whose crack-tip "
                 "fields depend on the speed of the crack as well; leave it out"
             )
-        if criterion.viscosity > 0.0 and law_of(debond).driver != "once":
+        if criterion.viscosity > 0.0 and explicit_law(debond).driver != "once":
             raise InputError(
                 f"{where}: in explicit dynamics viscosity delays a release at once; add "
                 "release=StepRelease(), or use viscosity=0: a progressive release needs none"
@@ -201,7 +201,7 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
 def warn_of_step_release(debonds: Sequence[Debond]) -> None:
     """Warn where bonds are released at once: then a running crack does not measure toughness."""
     for debond in debonds:
-        law = law_of(debond)
+        law = explicit_law(debond)
         if law.driver == "once" and not debond.criterion.viscosity > 0.0:
             log.warn(
                 "interface '%s': StepRelease in explicit dynamics lets a node go at once, which "

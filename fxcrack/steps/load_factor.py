@@ -78,7 +78,7 @@ class LoadFactor:
                 "one load or prescribed displacement"
             )
         for g in analysis.active:
-            if g.evaluator.breaks() or g.debond.release.driver == "time" or analysis.ramps:
+            if g.evaluator.breaks() or g.law.driver == "time" or analysis.ramps:
                 raise InputError(
                     f"interface '{g.title}' grows or is released with time, which {stepping} does "
                     "not have: it moves the load forth and back; use 'event' or 'increment'"

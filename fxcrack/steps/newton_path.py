@@ -36,6 +36,8 @@ _RESOLVED = 1e-13
 """Part of the time below which a bracket is not divided: f jumps over 1 there."""
 _NO_PROGRESS = 4e-16
 """Increments below this part of the time are round-off."""
+_NUDGE = 1e-12
+"""Part of the time by which the load goes on where increments of no length leave f below 1."""
 _SMALLEST = 1e-6
 """Smallest increment, as a part of the whole, before the search is given up."""
 
@@ -96,6 +98,12 @@ class NewtonLoadPath:
             begin = self._analysis.time
             way = min(size, abs(target - begin)) * (1.0 if upward else -1.0)
             guess = self._predicted(begin + way, upward=upward)
+            if idle and beyond is None:
+                # the tangent has bonds run through unstable states at this very load, and the
+                # iteration finds the state before them: go on, a little at first
+                least = min(abs(way), _NUDGE * 2.0**idle * abs(begin))
+                if abs(guess - begin) < least:
+                    guess = begin + (least if upward else -least)
             jumps = False
             if beyond is not None:
                 bracket = bracket or Bracket(begin, beyond[0])

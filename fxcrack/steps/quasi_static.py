@@ -59,7 +59,7 @@ def run_static(analysis: Analysis, step: Static, **controls: Any) -> str:
 def _check_releases(analysis: Analysis, step: Static) -> None:
     """Refuse releases over increments where the stepping has none."""
     for g in analysis.active:
-        viscosity, law = g.criterion.viscosity, g.debond.release
+        viscosity, law = g.criterion.viscosity, g.law
         if isinstance(law, ProgressiveRelease) and law.zone != 1:
             raise InputError(
                 f"interface '{g.title}': ProgressiveRelease(zone={law.zone}) is for fast cracks in "

@@ -69,7 +69,7 @@ def _open(analysis: Analysis, g: Crack, nodes: Ints, values: TipValues) -> None:
     solver, time = analysis.condensed, analysis.time
     corners = nodes
     nodes = solver.pairs[g.p].opened_with(g.front.bonded, nodes)
-    law, viscosity = g.debond.release, g.criterion.viscosity
+    law, viscosity = g.law, g.criterion.viscosity
     ramp: PrescribedRamp | ViscousRamp | ViscousCohesiveRamp
     if g.opening_driven:
         units = g.to_soften(corners, values)

@@ -428,8 +428,15 @@ SCENES: dict[str, Golden] = {
     ),
     "front_step": Golden(
         "3-D front, exact closure, step release, contact",
-        lambda comm: front(comm, criterion=fx.VCCT(GIc=0.2, method="closure")),
+        lambda comm: front(
+            comm, criterion=fx.VCCT(GIc=0.2, method="closure"), release=fx.StepRelease()
+        ),
         until(10),
+    ),
+    "front_default": Golden(
+        "3-D front, default release, mixed mode by BK, contact",
+        lambda comm: front(comm, criterion=MIXED),
+        until(6),
     ),
     "front_progressive": Golden(
         "3-D front, progressive release, three toughnesses",

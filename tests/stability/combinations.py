@@ -236,7 +236,7 @@ def criterion_of(c: Combination, rate: float, size: Described) -> Any:
 
 RELEASES: dict[str, Callable[[], Any]] = {
     "step": fx.StepRelease, "enhanced": fx.StepRelease, "ramp": fx.RampRelease,
-    "progressive": fx.ProgressiveRelease,
+    "progressive": fx.ProgressiveRelease, "default": lambda: None,
 }  # fmt: skip
 
 

@@ -5,6 +5,8 @@ By seed (tests/stability/combinations.py); more of them are in :mod:`stability.t
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from mpi4py import MPI
 
@@ -16,6 +18,7 @@ from stability.relations import broken, difference, relations_of
 pytestmark = pytest.mark.stability
 
 QUICK = (7, 24, 36, 40)
+BY_DEFAULT = (86, 331, 344)
 ON_RANKS = (3, 4, 7, 0, 2, 5, 9, 10, 13, 17, 18, 36, 174, 264)
 
 
@@ -26,6 +29,14 @@ def fails(seed: int) -> list[str]:
 @pytest.mark.parametrize("seed", QUICK)
 def test_a_few_scenes(seed: int) -> None:
     assert not fails(seed), Combination.of(seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", BY_DEFAULT)
+def test_scenes_in_3d_without_a_named_release(seed: int) -> None:
+    c = Combination.of(seed)
+    assert c.solid and c.release == "step"
+    assert not check(replace(c, release="default"), seed)[1]
 
 
 @pytest.mark.slow
