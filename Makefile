@@ -33,6 +33,9 @@ docs: $(ready) ## the documentation, in out/docs; warnings are errors
 figures: $(ready) ## pictures of README and pages whose demo has changed, by running it
 	.venv/bin/python demos/pictures/make.py
 
+numbers: $(ready) ## numbers of README and pages whose demo has changed, by running it
+	.venv/bin/python docs/numbers/make.py
+
 notebooks: $(ready) ## the notebooks in docs/notebooks, from the scripts of the demos
 	.venv/bin/python docs/notebooks/make.py
 
@@ -51,4 +54,4 @@ distclean: clean ## remove the environment too
 $(ready): pyproject.toml .ci/bootstrap
 	.ci/bootstrap
 
-.PHONY: help demo smoke random test test-slow test-all lint docs figures notebooks bench clean distclean
+.PHONY: help demo smoke random test test-slow test-all lint docs figures numbers notebooks bench clean distclean

@@ -17,7 +17,7 @@ from fxcrack.continuum.face import Face
 from fxcrack.continuum.generalised_plane_strain import GeneralisedPlaneStrain
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.kinematics import Axisymmetric, PlaneStrain, PlaneStress, Shell, Solid
-from fxcrack.continuum.laminate import Laminate, Ply
+from fxcrack.continuum.laminate import Laminate
 from fxcrack.continuum.loads import (
     BodyForce,
     Displacement,
@@ -31,6 +31,7 @@ from fxcrack.continuum.loads import (
 )
 from fxcrack.continuum.materials import Isotropic, NeoHookean, Orthotropic, Plastic
 from fxcrack.continuum.node_supports import Clamp, Rotation, Symmetry
+from fxcrack.continuum.ply import Ply
 from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import ByTemperature, Temperature
 from fxcrack.criteria import (

@@ -13,7 +13,6 @@ import importlib.metadata
 import importlib.util
 import logging
 import os
-import platform
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -35,9 +34,9 @@ from fxcrack.base.machine import cores, machine_memory_mb
 from fxcrack.base.parallel import all_arrive, end_all
 from fxcrack.base.signals import Interrupted
 from fxcrack.base.terminal import rank_0_console
+from fxcrack.environment import information
 
 _PATIENCE = 5.0  # seconds a rank that failed waits for the others to fail with it
-_PACKAGES = ("mumps", "superlu_dist", "superlu", "umfpack", "strumpack", "hypre", "ml", "ptscotch")
 
 app = typer.Typer(
     name="fxcrack",
@@ -393,46 +392,6 @@ def accuracy(
 
 
 # -- information ---------------------------------------------------------------------
-
-
-def information() -> dict[str, str]:
-    """Versions, solvers and ranks, one line each."""
-    import dolfinx
-    import petsc4py
-    from petsc4py import PETSc
-
-    from fxcrack.condensation.mumps_schur import library
-
-    petsc = ".".join(str(n) for n in PETSc.Sys.getVersion())
-    kind = f"{PETSc.ScalarType.__name__}, {PETSc.IntType.__name__}"
-    solvers = [p for p in _PACKAGES if PETSc.Sys.hasExternalPackage(p)]
-    schur = "taken out of MUMPS through PETSc's C interface"
-    if library() is None:
-        schur = "by back-solves (PETSc's C interface with MUMPS cannot be reached)"
-    mpi = MPI.Get_library_version().replace("\0", "").split("\n")[0].split(",")[0]
-    return {
-        "fxcrack": fxcrack.__version__,
-        "python": f"{platform.python_version()}, {platform.system()} {platform.machine()}",
-        "dolfinx": dolfinx.__version__,
-        "PETSc": f"{petsc} ({kind})",
-        "petsc4py": petsc4py.__version__,
-        "mpi4py": f"{importlib.metadata.version('mpi4py')}, {' '.join(mpi.split())}",
-        "gmsh": _gmsh(),
-        **{p: importlib.metadata.version(p) for p in ("numpy", "scipy")},
-        "solvers": ", ".join([*solvers, "gamg"]),
-        "Schur complement": schur,
-        "ranks": str(MPI.COMM_WORLD.size),
-        "threads": f"{os.environ.get('OMP_NUM_THREADS', 'not limited')} "
-        f"(OMP_NUM_THREADS), {cores()} cores",
-    }
-
-
-def _gmsh() -> str:
-    """Version of gmsh, or why it does not load."""
-    try:
-        return str(importlib.import_module("gmsh").__version__)
-    except (ImportError, OSError, AttributeError) as error:
-        return f"does not load: {error}"
 
 
 @app.command()

@@ -12,8 +12,8 @@ converge with the square of 1/order at tips and corners (I. Babuska, B. A. Szabo
 p-version of the finite element method, SIAM J. Numer. Anal. 18 (1981) 515-545) and faster where
 solutions are smooth, so that the error of second order is a third of that of first order at most.
 First-order triangles and tetrahedra lock in bending and say nothing about second-order ones: on
-them the jumps of the strain between cells of the run itself are taken
-(:mod:`fxcrack.continuum.strain_jumps`), a bound.
+them the energy of the jumps of the strain between cells of the run itself is taken
+(:mod:`fxcrack.continuum.strain_jumps`).
 
 Criteria without an energy release rate, shells, cycles and bonds for which there is no domain
 integral are judged by the difference from the other order alone; for a second-order run that is a
@@ -243,23 +243,66 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
     domain: float | None = None
     jumps: float | None = None
     # of nonlinear triangles and tetrahedra neither order nor jumps tell the stiffness
-    if order == 2 and not isinstance(step, Cycles) and (analysis.linear or not simplices):
-        domain, jumps, size = _beside_domain_integral(scene, step, grow, name, simplices=simplices)
-        if domain is not None and jumps is not None:
-            return Estimate(
-                load=jumps + (1.0 + domain) ** (1.0 / degree) - 1.0,
-                G=2.0 * jumps + domain,  # at given openings it goes with their square
-                stepping=_stepping(analysis.history, name, degree, excess),
-                cycles=None,
-                order=order,
-                size=size,
-                difference=max(jumps, domain),
-                interface=name,
-                simplices=True,
-                domain=domain,
-                jumps=jumps,
-                seconds=_since(analysis, start),
-            )
+    if order == 2 and not cycles and (analysis.linear or not simplices):
+        domain, jumps, size = _beside_domain_integral(
+            scene, cast(Static, step), grow, name, simplices=simplices
+        )
+    life = None
+    at_tip = domain or 0.0
+    if domain is not None and jumps is not None:
+        stiff = jumps, 2.0 * jumps  # at given openings G goes with the square of the stiffness
+        difference = max(jumps, domain)
+    else:
+        jumps = None
+        load, rate, size = _beside_other_order(scene, step, grow, ours, excess, degree, rates)
+        more = _MORE if order == 1 else 1.0 if domain is None else _STIFFER
+        stiff, difference = (more * load, more * rate), max(load, rate)
+        if cycles:
+            exponents = [
+                abs(g.criterion.life_exponent(float(cyclic_parts(g)[1].toughness[:, 0].mean())))
+                for g in analysis.active
+            ]
+            life = (1.0 + more * rate) ** max(exponents, default=0.0) - 1.0
+    return Estimate(
+        load=stiff[0] + (1.0 + at_tip) ** (1.0 / degree) - 1.0,
+        G=stiff[1] + at_tip,
+        stepping=_stepping(analysis.history, name, degree, excess),
+        cycles=life,
+        order=order,
+        size=size,
+        difference=difference,
+        interface=name,
+        simplices=simplices,
+        domain=domain,
+        jumps=jumps,
+        seconds=_since(analysis, start),
+    )
+
+
+def _beside_other_order(
+    scene: Rerunnable, step: Static | Cycles, grow: Sequence[Debond],
+    ours: Row, excess: float, degree: float, rates: bool,
+) -> tuple[float, float, float]:  # fmt: skip
+    """Another run to the first onset, of the other order on the same mesh; collective.
+
+    Args:
+        scene: The scene, after its run.
+        step: The step it ran.
+        grow: Debonds that were allowed to grow.
+        ours: Its row at the first onset.
+        excess: f - 1 there.
+        degree: Power of the load with which f goes.
+        rates: Whether all criteria know energy release rates.
+
+    Returns:
+        Relative differences of the load and of G, and the element size at the front, length.
+
+    Raises:
+        AccuracyError: The scene does not run with the other order.
+    """
+    analysis = scene.analysis
+    order, cycles = analysis.continuum.order, isinstance(step, Cycles)
+    _, name, _ = _first(analysis.history, grow, cycles=cycles)
     try:
         twin = scene.rebuilt(order=3 - order)
         try:
@@ -277,28 +320,7 @@ def estimate_errors(scene: Rerunnable, step: Static | Cycles, grow: Sequence[Deb
         ) from error
     scale = ((1.0 + other) / (1.0 + excess)) ** (1.0 / degree)  # both at f = 1
     load, rate = _differences(ours, theirs, name, 2 if rates else 1, scale, cycles=cycles)
-    more = _MORE if order == 1 else 1.0 if domain is None else _STIFFER
-    at_tip = domain or 0.0
-    life = None
-    if cycles:
-        exponents = [
-            abs(g.criterion.life_exponent(float(cyclic_parts(g)[1].toughness[:, 0].mean())))
-            for g in analysis.active
-        ]
-        life = (1.0 + more * rate) ** max(exponents, default=0.0) - 1.0
-    return Estimate(
-        load=more * load + (1.0 + at_tip) ** (1.0 / degree) - 1.0,
-        G=more * rate + at_tip,
-        stepping=_stepping(analysis.history, name, degree, excess),
-        cycles=life,
-        order=order,
-        size=size,
-        difference=max(load, rate),
-        interface=name,
-        simplices=simplices,
-        domain=domain,
-        seconds=_since(analysis, start),
-    )
+    return load, rate, size
 
 
 def _beside_domain_integral(

@@ -46,7 +46,7 @@ from fxcrack.continuum.loads import (
 from fxcrack.continuum.materials import Material
 from fxcrack.continuum.node_supports import Clamp, Rotation, Support, Symmetry
 from fxcrack.continuum.section import Section
-from fxcrack.continuum.section_loads import section_loads, section_monitors
+from fxcrack.continuum.shared_loads import shared_loads, shared_monitors
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
@@ -207,8 +207,8 @@ def compose(given: SceneInput) -> Analysis:
     check_friction([d for d in given.debonds if d.criterion.softens], pairs)
     chosen = plan(continuum, given.effects, given.loads, given.interfaces, given.solver)
     loads = dead_loads(continuum, given.loads, chosen.solver, pairs, supports)
-    loads = [*section_loads(continuum), *loads]  # those of a temperature come last
-    monitors: list[Any] = [*given.monitors, *section_monitors(continuum)]
+    loads = [*shared_loads(continuum), *loads]  # those of a temperature come last
+    monitors: list[Any] = [*given.monitors, *shared_monitors(continuum)]
     parts = continuum, pairs, supports, loads, monitors
     foundation = None if given.stabilise is None else Foundation(continuum, given.stabilise)
     solver: Solver

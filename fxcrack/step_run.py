@@ -41,6 +41,7 @@ from fxcrack.steps.rows import Observer
 from fxcrack.steps.share_done import ShareDone
 from fxcrack.steps.solver_work import SolverWork
 from fxcrack.steps.static import Dynamic, Static
+from fxcrack.steps.unit_check import warn_of_units
 
 
 def check_step(
@@ -151,6 +152,7 @@ def run_step(
     _check_lengths(analysis, step)
     tough = [getattr(g.evaluator, "toughness", None) for g in analysis.cracks]
     check_same_call(analysis.comm, "Scene.run", {"toughness at the slave nodes": tough})
+    warn_of_units(analysis.active, analysis.continuum, analysis.said)
     restarts = files.manager(analysis, step, may_grow, checkpoint, restart, save)
     try:
         _prepare(analysis, restarts, may_grow, step)

@@ -72,6 +72,24 @@ def test_a_clamped_end(caplog: pytest.LogCaptureFixture) -> None:
     scene.close()
 
 
+@pytest.mark.parametrize(("modulus", "toughness"), [(70e9, 0.2), (70e9, 200.0), (70e3, 0.2)])
+def test_moduli_in_pa_beside_millimetres(
+    caplog: pytest.LogCaptureFixture, modulus: float, toughness: float
+) -> None:
+    """Told once, with the strain; a toughness in J/m^2 beside Pa and mm is not told apart."""
+    scene = specimen(
+        plate(MPI.COMM_SELF, 40.0),
+        materials=fx.Isotropic(modulus, 0.3),
+        criterion=fx.VCCT(GIc=toughness),
+    )
+    for time in (1e-3, 2e-3):
+        scene.run(fx.Static(until=fx.Time(time)), progress=False)
+    words = [m for m in caplog.messages if "one system of units" in m]
+    assert len(words) == (modulus > 1e9 and toughness < 1.0)
+    assert all("strain by about 1e-06" in m for m in words)
+    scene.close()
+
+
 @pytest.mark.parametrize(
     ("order", "difference", "simplices", "words"),
     [

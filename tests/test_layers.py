@@ -26,13 +26,15 @@ ORDER = (
     *("base", "mesh", "meshes", "continuum", "interface", "condensation", "equilibrium"),
     *("solvers", "criteria", "history", "steps", "restart", "output"),
     *("effects", "error_estimate", "beam_theory", "scene_input", "step_run", "scene", "deck"),
-    *("public names", "identify", "demos", "accuracy", "bench", "cli", "command"),
+    *("public names", "environment", "identify", "demos", "accuracy", "bench", "cli", "command"),
 )
 """From the bottom up; "public names" is ``fxcrack/__init__.py``."""
 
 ON_USE = {
     "mesh.read -> gmsh": "only a gmsh model or file needs it, and it loads a large library",
     "history -> output.plots": "matplotlib is loaded by those who plot; the one arrow upwards",
+    "base.roots -> scipy.optimize": "a tenth of a second that runs without such a root save",
+    "equilibrium.contact -> scipy.optimize": "likewise: the fallback of the active set alone",
     "history -> pandas": "an optional library that only to_frame needs",
     "scene -> output.report": "it loads Jinja2, an optional library, and matplotlib",
     "accuracy.scenes -> demos": "a study loads its own demo alone; one of them loads matplotlib",

@@ -39,6 +39,9 @@ from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import CrackLength, Releases
 
+_METHODS = ("vcct", "closure", "domain")
+"""How G is found in quasi-static studies."""
+
 
 def _bond(start: float, *, contact: bool = False) -> Interface:
     """The interface "bond" of two arms, bonded from x = start on."""
@@ -68,6 +71,7 @@ def _elements(height: float, size: float) -> int:
 
 @study(
     sizes=(1.0, 0.5, 0.25, 0.125, 0.0625),
+    methods=_METHODS,
     steppings=("event", "increment"),
     tolerances=(0.2, 0.05, 0.01),
     solvers=("auto", "columns", "iterative"),
@@ -122,6 +126,7 @@ def dcb(setting: Setting) -> Case:
 
 @study(
     sizes=(1.0, 0.5, 0.25, 0.125),
+    methods=_METHODS,
     steppings=("event", "increment"),
     tolerances=(0.2, 0.05, 0.01),
     ranks=(1, 2),
@@ -170,6 +175,7 @@ def enf(setting: Setting) -> Case:
 
 @study(
     sizes=(1.0, 0.5, 0.25, 0.125),
+    methods=_METHODS,
     steppings=("path",),
     ranks=(1, 2),
     title="MMB of carbon fibre, lever 42 mm, plane stress, growth from 30 to 36.5 mm",
@@ -220,6 +226,7 @@ def mmb(setting: Setting) -> Case:
 
 @study(
     sizes=(0.4, 0.2, 0.1, 0.05, 0.025, 0.0125),
+    methods=_METHODS,
     steppings=("event", "increment"),
     tolerances=(0.2, 0.05, 0.01),
     ranks=(1, 2),

@@ -43,7 +43,7 @@ class Setting:
         cell: "quadrilateral", "triangle", "hexahedron" or "tetrahedron"; "continuum shell" for
             hexahedra, or "shell" for quadrilaterals in space, as these elements;
             "shell with compliant bonds" for the latter with the compliance of their arms in bonds.
-        method: How G is found: "vcct" or "closure".
+        method: How G is found: "vcct", "closure" or "domain".
         stepping: "event", "increment" or "path".
         tolerance: f_tol of increment stepping; ``None`` for the criterion's own.
         solver: How the bodies are condensed: a ``method`` of :class:`fxcrack.CondensedOptions`.

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq
 
 _MOST = 2200
 """Evaluations: halving from the largest to the smallest numbers needs fewer."""
@@ -52,6 +51,8 @@ def bracketed_root(
         if (y >= 0.0) == (f_high >= 0.0):
             end = min(end, x)
         return y
+
+    from scipy.optimize import brentq  # slow to import, and many runs need no root
 
     brentq(
         value, low, high, xtol=float(np.finfo(float).tiny), rtol=4.0 * np.finfo(float).eps,

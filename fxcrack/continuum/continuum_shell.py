@@ -13,8 +13,9 @@ import numpy as np
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import keep, numbers, shown
 from fxcrack.base.errors import InputError
-from fxcrack.continuum.laminate import Laminate, Ply
+from fxcrack.continuum.laminate import Laminate
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.ply import Ply
 
 Axis = tuple[float, float, float] | Callable[[Array], Array]
 """A global direction, or a function of positions, shape (3, n) to directions of that shape."""

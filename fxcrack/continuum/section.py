@@ -16,7 +16,8 @@ import numpy as np
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import finite, keep, keep_floats, list_of, numbers, positive, shown
 from fxcrack.base.errors import InputError
-from fxcrack.continuum.laminate import Laminate, Ply
+from fxcrack.continuum.laminate import Laminate
+from fxcrack.continuum.ply import Ply
 
 
 @dataclass(frozen=True)

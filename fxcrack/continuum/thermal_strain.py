@@ -22,8 +22,8 @@ from fxcrack.base.errors import InputError
 from fxcrack.continuum.amplitudes import AmplitudeLike
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStress
-from fxcrack.continuum.laminate import square_strain
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.ply import square_strain
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.shell_temperature import ShellTemperature
 from fxcrack.continuum.temperature import ByTemperature, expansion_of

@@ -17,8 +17,8 @@ import numpy as np
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.kinematics import PlaneStress
-from fxcrack.continuum.laminate import square_strain
 from fxcrack.continuum.materials import NeoHookean, stiffness_of
+from fxcrack.continuum.ply import square_strain
 from fxcrack.continuum.temperature import expansion_of
 from fxcrack.criteria.crack_tip_fields import VOIGT
 

@@ -173,7 +173,7 @@ class ModesAtLength:
         return int(np.argmax(on))
 
 
-def closure_lengths(tips: Tips, order: int, method: str) -> Array:
+def lengths_of_closure(tips: Tips, order: int, method: str) -> Array:
     """Lengths over which cracks are closed, shape (n,) [length].
 
     Args:

@@ -19,7 +19,7 @@ from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
 from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.criteria.mixed_mode import total
-from fxcrack.criteria.mode_length import ModesAtLength, closure_lengths
+from fxcrack.criteria.mode_length import ModesAtLength, lengths_of_closure
 from fxcrack.criteria.probe import (
     FrontProbe,
     State,
@@ -186,7 +186,7 @@ class RateEvaluator(SofteningEvaluator):
             plain = weighted_rates(force, opening, weights)
         if self._modes is None:
             return plain
-        lengths = closure_lengths(tips, force.shape[1], self.criterion.method)
+        lengths = lengths_of_closure(tips, force.shape[1], self.criterion.method)
         return self._modes.split(tips, force, opening, weights, plain, lengths)
 
     def _closure_weights(self, tips: Tips, n_products: int) -> Array:

@@ -10,8 +10,9 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.kinematics import Axisymmetric, Model, PlaneStrain, PlaneStress, Shell, Solid
-from fxcrack.continuum.laminate import Laminate, Ply
+from fxcrack.continuum.laminate import Laminate
 from fxcrack.continuum.materials import Material
+from fxcrack.continuum.ply import Ply
 from fxcrack.continuum.section import Section
 from fxcrack.deck.cards import Card, DeckError, key
 from fxcrack.deck.distributions import distributed, find_distribution, same_values

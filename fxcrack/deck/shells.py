@@ -13,7 +13,8 @@ import numpy as np
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
-from fxcrack.continuum.laminate import Laminate, Ply
+from fxcrack.continuum.laminate import Laminate
+from fxcrack.continuum.ply import Ply
 from fxcrack.continuum.section import Section
 from fxcrack.deck.cards import Card, DeckError
 from fxcrack.deck.flat import Flat

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import nnls
 
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import ConvergenceError
@@ -207,6 +206,8 @@ class ContactSystem(JumpSystem):
         scale = 1.0 / np.sqrt(np.diagonal(compliance))
         lower = np.linalg.cholesky(compliance * scale[:, None] * scale)
         target = np.linalg.solve(lower, -gap * scale)
+        from scipy.optimize import nnls  # rarely needed, and slow to import
+
         pressure, _ = nnls(lower.T, target, maxiter=50 * len(normal))
         closed = np.zeros(self.n_retained, dtype=bool)
         closed[normal[pressure > 0.0]] = True

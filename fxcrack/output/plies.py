@@ -26,7 +26,8 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.continuum.kinematics import green_lagrange
-from fxcrack.continuum.laminate import Laminate, square_strain
+from fxcrack.continuum.laminate import Laminate
+from fxcrack.continuum.ply import square_strain
 from fxcrack.continuum.shell_cells import ShellCells
 from fxcrack.continuum.shell_hexahedron import values as shapes
 from fxcrack.continuum.tied_cells import TiedCells

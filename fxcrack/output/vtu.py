@@ -6,12 +6,12 @@ Arrays are stored at full precision, compressed, base64. No function communicate
 from __future__ import annotations
 
 import base64
+import html
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import numpy.typing as npt
@@ -64,14 +64,19 @@ def _encode(values: npt.NDArray[Any]) -> str:
     return base64.b64encode(head.tobytes()).decode() + base64.b64encode(packed).decode()
 
 
+def _quoted(text: str) -> str:
+    """A text as the value of an attribute (xml.sax.saxutils would load urllib)."""
+    return f'"{html.escape(text)}"'
+
+
 def _describe(name: str, values: npt.NDArray[Any], grid: Grid) -> str:
     """Attributes of a data array, the same in pieces and in their header."""
     kind = f"{_TYPES[values.dtype.kind]}{8 * values.dtype.itemsize}"
-    text = f'type="{kind}" Name={quoteattr(name)}'
+    text = f'type="{kind}" Name={_quoted(name)}'
     if values.ndim > 1:
         text += f' NumberOfComponents="{values.shape[1]}"'
     for i, component in enumerate(grid.components.get(name, ())):
-        text += f" ComponentName{i}={quoteattr(component)}"
+        text += f" ComponentName{i}={_quoted(component)}"
     return text
 
 
@@ -123,7 +128,7 @@ def write_header(path: Path, grid: Grid, pieces: Sequence[str]) -> None:
         *("<PPoints>", *arrays({"Points": grid.points}), "</PPoints>"),
         *("<PPointData>", *arrays(grid.point_data), "</PPointData>"),
         *("<PCellData>", *arrays(grid.cell_data), "</PCellData>"),
-        *(f"<Piece Source={quoteattr(piece)}/>" for piece in pieces),
+        *(f"<Piece Source={_quoted(piece)}/>" for piece in pieces),
         "</PUnstructuredGrid>",
     ]
     path.write_text(_file("PUnstructuredGrid", lines))
@@ -132,6 +137,6 @@ def write_header(path: Path, grid: Grid, pieces: Sequence[str]) -> None:
 def write_series(path: Path, steps: Iterable[tuple[float, str]]) -> None:
     """Write a .pvd file: times and the files that hold them."""
     lines = [
-        f'<DataSet timestep="{time!r}" part="0" file={quoteattr(name)}/>' for time, name in steps
+        f'<DataSet timestep="{time!r}" part="0" file={_quoted(name)}/>' for time, name in steps
     ]
     path.write_text(_file("Collection", ["<Collection>", *lines, "</Collection>"]))

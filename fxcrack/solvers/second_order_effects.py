@@ -90,6 +90,8 @@ def second_order_effects(solver: LinearSolver, displacement: Array) -> SecondOrd
         forces.append(force / np.sqrt(energy))
         force = -cells.geometric(displacement, vectors[-1])
         softening.append(force)
+    if not vectors:  # nothing can move
+        return SecondOrderEffects(float(eta), 0.0)
     n = len(vectors)
     table = dots([(x, f) for x in vectors for f in forces + softening]).reshape(n, 2 * n)
     return SecondOrderEffects(float(eta), _largest(table[:, :n], table[:, n:]))

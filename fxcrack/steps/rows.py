@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fxcrack.history import Row
 from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis
-from fxcrack.steps.section_columns import is_section, section_columns
+from fxcrack.steps.shared_numbers import columns_of_shared, is_shared
 
 Observer = Callable[[str, Row], None]
 """Called on all ranks with the name of every event and its row of the history."""
@@ -75,7 +75,7 @@ def history_row(analysis: Analysis, event: str) -> Row:
     for (load, answer, moves), part, a, r in zip(
         load_columns(solver), acting, state.loads, state.conjugate, strict=True
     ):
-        if is_section(part):
+        if is_shared(part):
             continue
         if moves:
             row[load] = float(a)
@@ -83,9 +83,9 @@ def history_row(analysis: Analysis, event: str) -> Row:
     # displacements that criteria follow come after those of the user
     monitored = system.monitors(state)
     for monitor, value in zip(solver.monitors, monitored, strict=False):
-        if not is_section(monitor):
+        if not is_shared(monitor):
             row[f"m[{monitor.title}]"] = float(value)
-    row |= section_columns(solver, state.loads, state.conjugate, monitored)
+    row |= columns_of_shared(solver, state.loads, state.conjugate, monitored)
     for g, v in analysis.at_tips():
         row[f"a[{g.title}]"] = g.extent.length(v.tips)
         row[f"area[{g.title}]"] = g.extent.area(v.tips)

@@ -15,7 +15,7 @@ from fxcrack.continuum.generalised_plane_strain import SharedUnknown, shared_unk
 
 
 @dataclass(frozen=True)
-class SectionForce:
+class SharedForce:
     """Resultant of a free number of the section, a force pattern.
 
     Attributes:
@@ -43,7 +43,7 @@ class SectionForce:
 
 
 @dataclass(frozen=True)
-class SectionMonitor:
+class SharedMonitor:
     """A free number of the section, watched as displacements are.
 
     Attributes:
@@ -71,15 +71,15 @@ def _at_dof(continuum: Continuum, shared: SharedUnknown, value: float) -> Array:
     return out
 
 
-def section_loads(continuum: Continuum) -> list[SectionForce]:
+def shared_loads(continuum: Continuum) -> list[SharedForce]:
     """Resultants of free numbers that are not zero."""
     free = [s for s in shared_unknowns(continuum.model) if s.prescribed is None]
-    return [SectionForce(s) for s in free if s.load]
+    return [SharedForce(s) for s in free if s.load]
 
 
-def section_monitors(continuum: Continuum) -> list[SectionMonitor]:
+def shared_monitors(continuum: Continuum) -> list[SharedMonitor]:
     """Monitors of the free numbers."""
-    return [SectionMonitor(s) for s in shared_unknowns(continuum.model) if s.prescribed is None]
+    return [SharedMonitor(s) for s in shared_unknowns(continuum.model) if s.prescribed is None]
 
 
-__all__ = ["SectionForce", "SectionMonitor", "section_loads", "section_monitors"]
+__all__ = ["SharedForce", "SharedMonitor", "shared_loads", "shared_monitors"]

@@ -7,17 +7,17 @@ from typing import Any
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.generalised_plane_strain import SharedUnknown, shared_unknowns
-from fxcrack.continuum.section_loads import SectionForce, SectionMonitor
+from fxcrack.continuum.shared_loads import SharedForce, SharedMonitor
 from fxcrack.history import Row
 from fxcrack.solvers.base import Solver
 
 
-def is_section(part: object) -> bool:
+def is_shared(part: object) -> bool:
     """Whether a support, load or monitor belongs to such a number, which has own columns."""
-    return isinstance(part, SharedUnknown | SectionForce | SectionMonitor)
+    return isinstance(part, SharedUnknown | SharedForce | SharedMonitor)
 
 
-def section_columns(
+def columns_of_shared(
     solver: Solver, loads: Sequence[float] | Array, conjugate: Array, monitored: Array
 ) -> Row:
     """Each number and its resultant in a state.
@@ -41,16 +41,16 @@ def section_columns(
             row[one.title] = float(loads[i]) * one.per_unknown
             row[one.answer] = float(conjugate[i]) * one.per_reaction
         else:
-            row[one.title] = float(monitored[watched.index(SectionMonitor(one))])
+            row[one.title] = float(monitored[watched.index(SharedMonitor(one))])
             row[one.answer] = sum(
                 (
                     float(factor) * one.load
                     for load, factor in zip(acting, loads[len(columns) :], strict=True)
-                    if load == SectionForce(one)
+                    if load == SharedForce(one)
                 ),
                 0.0,
             )
     return row
 
 
-__all__ = ["is_section", "section_columns"]
+__all__ = ["columns_of_shared", "is_shared"]
