@@ -28,9 +28,11 @@ def warn_of_units(cracks: Sequence[Crack], continuum: Continuum, said: set[str])
         continuum: The bodies.
         said: What was warned of before; "units" is added.
     """
+    # of shells and continuum shells the mean of their plies
+    bodies = [getattr(m, "laminate", m) for m in continuum.part_materials]
     moduli = [
         float(np.diag(np.asarray(m.stiffness())).max())
-        for m in continuum.part_materials
+        for m in bodies
         if hasattr(m, "stiffness") and np.ndim(m.stiffness()) == 2
     ]
     if "units" in said or not moduli:
