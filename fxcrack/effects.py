@@ -28,6 +28,7 @@ from fxcrack.continuum.temperature import Temperature, expansion_of
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
 from fxcrack.continuum.tied_elastic import TiedElastic
+from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.pair import Pair
@@ -171,11 +172,6 @@ def plan(
     for load in loads:
         if isinstance(load, Pressure) and load.follows_crack:
             on.append(f"pressure '{load.title}' on the faces of a crack as they open")
-            if finite:
-                raise InputError(
-                    f"pressure '{load.title}': follows_crack is for small strain; leave out "
-                    "FiniteStrain() and NeoHookean"
-                )
     if continuum.temperature is not None:
         if not any(
             hasattr(m, "temperatures") or expansion_of(m).any() for m in continuum.part_materials
@@ -227,6 +223,22 @@ def form_terms(continuum: Continuum, effects: Sequence[Any], loads: Sequence[Loa
     for effect in (e for e in effects if isinstance(e, Inertia)):
         terms = [*conserving(continuum, terms, effect), InertiaForces(continuum, effect)]
     return terms
+
+
+def crack_fluids(
+    continuum: Continuum, effects: Sequence[Any], loads: Sequence[Any], pairs: Sequence[Pair]
+) -> list[Term]:
+    """Terms of pressures that follow the crack where its faces turn; collective.
+
+    Args:
+        continuum: The bodies.
+        effects: The effects of the scene.
+        loads: Its force patterns.
+        pairs: Its interfaces; replaced in this list where nodes are paired anew.
+    """
+    if not is_finite(continuum, effects):
+        return []
+    return [CrackFluid(continuum, x, pairs) for x in loads if isinstance(x, CrackPressure)]
 
 
 def dead_loads(

@@ -48,7 +48,7 @@ from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_rules import check_interfaces, check_start, warn_of_step_release
-from fxcrack.steps.explicit_setup import start_from, use_explicit_solver
+from fxcrack.steps.explicit_setup import paired_by_nodes, start_from, use_explicit_solver
 from fxcrack.steps.rows import Observer
 from fxcrack.steps.static import Static
 
@@ -316,7 +316,7 @@ class Scene:
         use_explicit_solver(self.analysis, lambda c: form_terms(c, others, given.loads))
         warn_of_step_release(chosen)
         if begins and step.start == "equilibrium":
-            still = self.rebuilt(effects=others)
+            still = self.rebuilt(effects=others, **paired_by_nodes(given.debonds, given.bonds))
             # amplitudes that are there from the first moment; those that grow have not begun
             still.run(Static(until=Time(1e-12 * step.end_time)), grow=[], progress=False)
             start_from(self.analysis, still.analysis)

@@ -49,7 +49,7 @@ from fxcrack.continuum.section import Section
 from fxcrack.continuum.shared_loads import shared_loads, shared_monitors
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.weak_form import WeakForm
-from fxcrack.effects import dead_loads, form_terms, is_finite, plan, temperature_of
+from fxcrack.effects import crack_fluids, dead_loads, form_terms, is_finite, plan, temperature_of
 from fxcrack.history import History
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.locking import warn_of_locking
@@ -216,6 +216,7 @@ def compose(given: SceneInput) -> Analysis:
         solver = LinearSolver(*parts, given.options or CondensedOptions(), foundation)
     else:
         terms = form_terms(continuum, given.effects, given.loads)
+        terms += crack_fluids(continuum, given.effects, loads, pairs)
         solver = NewtonSolver(
             *parts,
             given.options or CondensedOptions(rows=0.0),

@@ -13,7 +13,7 @@ from fxcrack.base.checks import is_function, list_of
 from fxcrack.base.errors import InputError, SolverError
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
-from fxcrack.continuum.linear_range import warn_of_range
+from fxcrack.continuum.linear_range import warn_of_large_strain, warn_of_range
 from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.effects import is_finite
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
@@ -178,6 +178,11 @@ def run_step(
             if analysis.continuum.temperature is not None:
                 analysis.continuum.temperature.set(analysis.time)
             warn_of_second_order(analysis.solver, now, analysis.said)
+    if any(getattr(m, "form", "") == "plastic" for m in analysis.continuum.part_materials):
+        u = analysis.solver.displacement()
+        now = u.array_r.copy()
+        u.destroy()
+        warn_of_large_strain(analysis.continuum, now, analysis.said)
     constraints = analysis.solver.supports.constraints
     if constraints and is_finite(analysis.continuum, analysis.effects):
         u = analysis.solver.displacement()

@@ -16,7 +16,6 @@ from specimens import HELD_FAR, STEEL, bond, column, largest_imbalance, onsets
 
 import fxcrack as fx
 from fxcrack.base.errors import InputError
-from fxcrack.effects import FiniteStrain
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.meshes.penny import penny
 
@@ -171,8 +170,6 @@ def test_what_cannot_follow_the_crack() -> None:
     other = fx.Pressure("top", 1.0, follows_crack=True)
     with pytest.raises(InputError, match=r"'top' is the name or a surface of none; .*'crack'"):
         fractured(MPI.COMM_SELF, other)
-    with pytest.raises(InputError, match="follows_crack is for small strain"):
-        fractured(MPI.COMM_SELF, effects=[FiniteStrain()])
     with pytest.raises(InputError, match="monitor or pressure that follows the crack 'water'"):
         fractured(MPI.COMM_SELF).run(
             fx.Static(until=fx.Releases(1), stepping="opening", opening="water")

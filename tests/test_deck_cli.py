@@ -121,18 +121,18 @@ OTHERS = {
     "cps4r_parametric": "*USER MATERIAL is refused",
     "cube_mixed_case": "",
     "dcb3d_coh": "COH3D8 is refused: cohesive elements",
-    "dcb3d_tie": "188 of 1026 nodes of this surface belong to no element face",
+    "dcb3d_tie": None,
     "dcbenf_wedges": "C3D15 is refused: prisms",
     "distributing": "",
     "gaps_in_numbers": "",
     "hertz_cax4": "have a node more than once",
     "necking_cax4rt": "CAX4RT is refused: temperatures",
-    "plastic_cpe4": "plasticity is for small strain and cannot stand beside NLGEOM=YES",
-    "plate_s4r": "*MASS is refused: point masses",
+    "plastic_cpe4": "",
+    "plate_s4r": "the positive sides of 2 pairs of neighbouring shell elements differ",
     "preform_shear": "*DAMAGE INITIATION is refused",
     "two_instances": "*PLASTIC: the parameter PROPERTIES is not available",
 }
-"""What becomes of each: nothing (it runs), or part of a refusal."""
+"""What becomes of each: it runs (""), part of a refusal, or it is only read (``None``)."""
 
 
 @pytest.mark.skipif(REAL is None, reason="the decks of others are not part of this repository")
@@ -141,10 +141,13 @@ def test_decks_of_others_run_or_are_refused_by_name(name):
     assert REAL is not None
     path = Path(REAL) / f"{name}.inp"
     report = check_deck(path)
-    if OTHERS[name]:
-        assert any(OTHERS[name] in line for line in report.refused)
+    words = OTHERS[name]
+    if words:
+        assert any(words in line for line in report.refused)
         return
     assert not report.refused
+    if words is None:
+        return
     deck = fx.read_deck(path)
     history = deck.run()
     assert "reached" in history.reason

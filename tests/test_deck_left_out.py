@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.deck.cards import DeckError
@@ -116,3 +117,26 @@ def test_bonded_bodies_that_lock_are_told_how_much(tmp_path):
     assert not read(tmp_path, PLATE + STEP).report.doubts  # nothing is bonded
     path = write(tmp_path, text)
     assert not fx.read_deck(path, order=2).report.doubts
+
+
+def test_field_variables_on_which_nothing_depends(tmp_path):
+    fields = "*INITIAL CONDITIONS, TYPE=FIELD, VARIABLE=1\nALL, 1.\n"
+    step = STEP.replace("*END STEP", "*FIELD, VARIABLE=1\nALL, 2.\n*END STEP")
+    assert not read(tmp_path, PLATE + fields + step).arguments["effects"]
+    with pytest.raises(DeckError, match="DEPENDENCIES is not available"):
+        read(tmp_path, PLATE.replace("*ELASTIC", "*ELASTIC, DEPENDENCIES=1") + fields + step)
+
+
+@pytest.mark.mpi
+@pytest.mark.three
+def test_bodies_that_yield_at_large_strain_are_warned_of(shared_path, caplog):
+    """A bar drawn by 10 % of its length: the strain is 0.1, and so is the error."""
+    text = PLATE.replace("200., 0.25", "200., 0.25\n*PLASTIC\n1., 0.\n2., 1.")
+    step = STEP.replace("RIGHT, 1, 1, 0.1", "RIGHT, 1, 1, {}").replace("0.5, 1.", "1., 1.")
+    for pull, warned in ((0.2, True), (0.02, False)):
+        caplog.clear()
+        deck = fx.read_deck(write(shared_path, text + step.format(pull)))
+        deck.run()
+        if MPI.COMM_WORLD.rank == 0:
+            assert ("bodies that yield have strained by up to" in caplog.text) == warned
+        deck.scene.close()

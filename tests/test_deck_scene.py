@@ -291,6 +291,16 @@ def test_pressures_tractions_body_forces_and_gravity(tmp_path):
     assert loads["LAST.P3 2"].value(np.array([[0.0], [0.5], [0.0]])) == pytest.approx(1.0)
 
 
+def test_shear_tractions_lie_in_their_surface(tmp_path):
+    """On the edge x = 2 the direction (3, 4) is projected on y: the magnitude stays."""
+    step = stepped("*DSLOAD", "END, TRSHR, 5., 3., 4., 0.")
+    (load,) = arguments(tmp_path, PLATE + step)["loads"]
+    assert isinstance(load, fx.Traction) and load.value == pytest.approx((0.0, 5.0), abs=1e-15)
+    refused(tmp_path, PLATE + step.replace("3., 4., 0.", "1., 0., 0."), "is that of the normal")
+    corner = PLATE.replace("LAST, S2", "LAST, S2\nLAST, S3")
+    refused(tmp_path, corner + step, "TRSHR is available on flat surfaces")
+
+
 def test_gravity_on_a_part_of_the_model(tmp_path):
     text = PLATE.replace("200., 0.25", "200., 0.25\n*DENSITY\n2.") + "*BOUNDARY\nLEFT, PINNED\n"
     found = read(tmp_path, text + stepped("*DLOAD", "LAST, GRAV, 10., 0., -1., 0."))
@@ -343,9 +353,13 @@ def test_large_rotations_make_pressures_follow(tmp_path):
     step = step.replace("END, P, 3.", "END, TRVEC, 3., 1.").replace("*STEP", "*STEP, NLGEOM")
     refused(tmp_path, PLATE + step, "add FOLLOWER=NO")
     plastic = PLATE.replace("200., 0.25", "200., 0.25\n*PLASTIC\n1., 0.")
-    refused(
-        tmp_path, plastic + STEP.replace("*STEP", "*STEP, NLGEOM"), "cannot stand beside NLGEOM"
-    )
+    found = read(tmp_path, plastic + STEP.replace("*STEP", "*STEP, NLGEOM"))
+    assert not found.arguments["effects"]  # plasticity is for small strain
+    assert any("computed as with NLGEOM=NO" in line for line in found.report.replaced)
+    rubber = "*MATERIAL, NAME=R\n*HYPERELASTIC, NEO HOOKE\n1., 1.\n*ELSET, ELSET=F\n1\n"
+    rubber += "*SOLID SECTION, ELSET=F, MATERIAL=R\n2.\n"
+    both = plastic.replace("ELSET=PLATE, MATERIAL", "ELSET=LAST, MATERIAL") + rubber
+    refused(tmp_path, both + STEP.replace("*STEP", "*STEP, NLGEOM"), "beside \\*HYPERELASTIC")
 
 
 # -- temperature -----------------------------------------------------------------------------------
@@ -469,7 +483,7 @@ def test_dynamic_steps(tmp_path):
         ("*BOUNDRY\nLEFT, 1\n", r"did you mean \*BOUNDARY"),
         ("*BOUNDARY, AMPLITUD=A\nLEFT, 1\n", "there is no amplitude 'A'"),
         ("*BOUNDARY, WEIGHT=A\nLEFT, 1\n", "the parameter WEIGHT is not available"),
-        ("*INITIAL CONDITIONS, TYPE=FIELD\nALL, 1.\n", "TYPE=FIELD is not available"),
+        ("*INITIAL CONDITIONS, TYPE=HARDENING\nALL, 1.\n", "TYPE=HARDENING is not available"),
     ],
 )
 def test_steps_and_cards_that_are_refused(tmp_path, text, words):

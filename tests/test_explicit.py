@@ -408,3 +408,24 @@ def test_step_release_runs_through_tough_parts_and_progressive_release_does_not(
         reached.append(float(column(history.rows, "a[bond]")[-1]) / HALF)
     assert reached[0] >= 11.0 - 1e-9
     assert 7.0 <= reached[1] <= 8.0
+
+
+@pytest.mark.mpi
+def test_bodies_at_rest_stay_at_rest_on_meshes_that_do_not_match(comm: MPI.Intracomm) -> None:
+    """The equilibrium a step begins with pairs nodes as the step does: no motion but round-off.
+
+    Velocities are round-off of the displacement, 1e-15 to 1e-12 of it over an increment, whose
+    squares are energies.
+    """
+    held = fx.Amplitude((0.0,), (1.0,))
+    scene = beam(
+        comm, 0.0, mesh=coarse(comm, nx_lower=45), criterion=fx.VCCT(GIc=1e3),
+        supports=[
+            fx.Displacement(f"pin_{side}", x=0.0, y=y, amplitude=held)
+            for side, y in (("top", 0.3), ("bottom", -0.3))
+        ],
+    )  # fmt: skip
+    history = scene.run(fx.Explicit(until=fx.Time(1e-5), start="equilibrium", rows=5))
+    scene.close()
+    kinetic, strain = (history[f"{c}_energy"].astype(float) for c in ("kinetic", "strain"))
+    assert kinetic.max() <= 1e-15 * strain.min()

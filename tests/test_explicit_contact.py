@@ -146,3 +146,38 @@ def test_returning_to_an_earlier_increment_takes_its_loads() -> None:
     assert solver.bonds == pytest.approx(bonds, rel=1e-9, abs=1e-9 * np.abs(bonds).max())
     assert solver.reactions() == pytest.approx(reactions, rel=1e-9)
     scene.close()
+
+
+@pytest.mark.slow
+@pytest.mark.mpi
+def test_bonds_that_soften_in_shear_under_pressure_with_friction(
+    comm: MPI.Intracomm, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Friction and softening bonds share one slip; their forces are found in every increment.
+
+    Sweeps in which they gave way to each other needed more than 1,000 in some increments here.
+    """
+    slow = fx.SmoothStep((0.0, 1e-5), (0.0, 1.0))
+    interface = fx.Interface(
+        "upper_face", "lower_face", bonded=lambda x: x[0] >= 3.0 - 1e-9, name="faces",
+        contact=True, friction=1.0,
+    )  # fmt: skip
+    scene = fx.Scene(
+        dcb_2d(comm, length=8.0, height=1.5, dx=0.5, ny=3),
+        materials=fx.Isotropic(70e3, 0.3, density=2.7e-9),
+        model=fx.PlaneStrain(),
+        debonds=[fx.Debond(interface, fx.VCCT(0.05), fx.ProgressiveRelease())],
+        effects=[fx.Inertia()],
+        supports=[
+            fx.Displacement("bottom", x=0.0, y=0.0),
+            fx.Displacement.by_velocity("end_upper", x=5e3, amplitude=slow),
+        ],
+        loads=[fx.Pressure("top", 300.0, amplitude=slow)],
+    )
+    history = scene.run(fx.Explicit(until=fx.Time(3e-5), rows=10))
+    scene.close()
+    assert "did not settle" not in caplog.text
+    assert history["released[faces]"][-1] > 5
+    assert history["friction_energy"][-1] > 0.1 * history["external_work"][-1]
+    assert np.abs(history["balance"]).max() <= 1e-11 * history["external_work"].max()
+    assert history["spent[faces]"][-1] == pytest.approx(0.05, rel=1e-6)

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from test_domain_integral import INFLATED, SOFT, STIFF, oscillation, plate
+from test_shell_interfaces import bond as between_shells
+from test_shell_interfaces import two_arms
 
 import fxcrack as fx
 from fxcrack.criteria.crack_tip_fields import TipFields
@@ -146,3 +148,32 @@ def test_refusals() -> None:
         fx.VCCT(GIc=1.0, reference_length=0.1)
     with pytest.raises(fx.InputError, match="mode_length"):
         fx.VCCT(GIc=1.0, mode_length=-0.1)
+
+
+def test_refused_where_the_fields_of_the_tip_are_not_known() -> None:
+    """Moduli that change with the temperature, shells, explicit dynamics."""
+    bond = fx.Interface("upper_face", "lower_face", lambda x: x[0] >= 3.0 - 1e-9, name="bond")
+    options: dict[str, Any] = {
+        "supports": [fx.Displacement("far_upper", x=0.0, y=0.0),
+                     fx.Displacement("far_lower", x=0.0, y=0.0)],
+        "debonds": [fx.Debond(bond, fx.VCCT(GIc=1.0, mode_length=LENGTH))],
+    }  # fmt: skip
+    mesh = dcb_2d(MPI.COMM_SELF, length=6.0, height=1.0, dx=1.0, ny=1)
+    flat: dict[str, Any] = {"model": fx.PlaneStrain(), **options}
+
+    def refused(step: Any, on: Any = mesh, **arguments: Any) -> str:
+        with pytest.raises(fx.InputError, match="mode_length") as error:
+            fx.Scene(on, **arguments).run(step, progress=False)
+        return str(error.value)
+
+    still = fx.Static(until=fx.Time(1.0))
+    table = fx.ByTemperature({0.0: METAL, 100.0: RESIN})
+    warm = [fx.Temperature(1.0, reference=0.0)]
+    assert "temperature" in refused(still, materials=table, effects=warm, **flat)
+    heavy = fx.Isotropic(70e3, 0.3, density=1e-9)
+    assert "explicit" in refused(fx.Explicit(until=fx.Time(1e-6)), materials=heavy, **flat)
+    sheets = two_arms(MPI.COMM_SELF, length=6.0, width=1.0, heights=(0.5, 0.5), dx=1.0, ny=1)
+    options["supports"] = [fx.Clamp("upper_a1"), fx.Clamp("lower_a1")]
+    options["debonds"] = [fx.Debond(between_shells(3.0), fx.VCCT(GIc=1.0, mode_length=LENGTH))]
+    section = fx.Section(METAL, thickness=0.5)
+    assert "shells" in refused(still, sheets, model=fx.Shell(), materials=section, **options)

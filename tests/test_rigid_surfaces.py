@@ -88,7 +88,7 @@ def assert_half_of(half: fx.History, whole: fx.History) -> None:
     compared = 0
     for name in whole[-1]:
         if name.startswith(
-            ("R[pin_top.y", "u[pin_top", "a[", "area[", "f[", "G", "time", *ENERGIES)
+            ("R[pin_top.y", "u[pin_top", "a[", "area[", "f[", "G", "KI[", "time", *ENERGIES)
         ):
             a, b = (np.array([row.get(name, 0.0) for row in h]) for h in (half, whole))
             factor = 2.0 if name in ENERGIES else 1.0
@@ -108,6 +108,8 @@ WAYS = {
     # facets, which moves the opening by 6e-6; on the plane nothing slides
     "finite": {"effects": [fx.FiniteStrain()], "contact": False},
     "3d": {"gdim": 3},
+    "domain": {"criterion": fx.VCCT(GIc=0.2, method="domain"), "order": 2},
+    "domain, 3d": {"criterion": fx.VCCT(GIc=0.2, method="domain"), "gdim": 3},
     "opening": {"criterion": fx.CrackOpening(0.02, distance=1.0)},
     "stress": {"criterion": fx.CriticalStress(30.0, distance=0.5)},
 }
@@ -534,7 +536,7 @@ def test_no_curvature_across_a_plane_of_symmetry(curvature: float | None) -> Non
 def test_criteria_that_a_rigid_master_does_not_have() -> None:
     half = fx.Interface("a", PLANE, symmetry=True)
     with pytest.raises(InputError, match="one side is a rigid surface"):
-        fx.Debond(half, fx.VCCT(GIc=1.0, method="domain"))
+        fx.Debond(fx.Interface("a", PLANE), fx.VCCT(GIc=1.0, method="domain"))
     with pytest.raises(InputError, match="mode_length"):
         fx.Debond(half, fx.CriticalStress(1.0, distance=1.0), watch=[fx.VCCT(1.0, mode_length=1.0)])
     with pytest.raises(InputError, match="says symmetry=True already"):
@@ -560,6 +562,22 @@ def test_a_support_that_moves_a_bonded_node_is_refused(comm: MPI.Intracomm) -> N
 
 
 # -- restart -------------------------------------------------------------------------------
+
+
+def test_rings_of_a_half_with_loads_on_its_faces() -> None:
+    """Tractions in the ring, and those the crack is about to open: as in the whole."""
+    found = []
+    for half in (True, False):
+        faces = ("upper_face",) if half else ("upper_face", "lower_face")
+        scene, _ = dcb(MPI.COMM_SELF, half=half, criterion=fx.VCCT(GIc=0.2, method="domain"))
+        blown = scene.rebuilt(
+            supports=[fx.Displacement("far_upper", x=0.0, y=0.0)]
+            + ([] if half else [fx.Displacement("far_lower", x=0.0, y=0.0)]),
+            loads=[fx.Pressure(f, lambda x: np.where(x[0] < 10.0, 1.0, 0.0)) for f in faces],
+        )
+        rows = blown.run(fx.Static(until=fx.Releases(1)))
+        found.append([rows.at("a[bond]", 10.0, event="onset")[c] for c in ("time", "KI[bond]")])
+    assert found[0] == pytest.approx(found[1], rel=SAME)
 
 
 @pytest.mark.mpi

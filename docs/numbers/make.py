@@ -87,6 +87,29 @@ def _slow(table: Table) -> list[float]:
     return [float(table["rows"][0][i]) for i in (1, 2)]
 
 
+def _identified(tables: list[Table]) -> str:
+    """Toughness of two tests by the fit and by the methods of the standard."""
+    fits = {(row[0], row[1]): row[2:] for row in tables[0]["rows"]}
+    reduced = {(row[0], row[1]): row[2] for row in tables[1]["rows"]}
+    methods = ("MBT", "CC", "MCC")
+    rows = []
+    for test, title in (
+        ("synthetic", "DCB, 1 % noise"),
+        ("DCB-UD", "DCB-UD, onsets at mid-width in 3-D"),
+    ):
+        found, spread, given = fits[test, "GIc"]
+        by_method = [f"{reduced[test, m]:.4f}" for m in methods]
+        rows.append([title, f"{found:.4f} ± {spread:.4f}", *by_method, f"{given:g}"])
+    columns = ["data", "fit on load and opening", *methods, "put in"]
+    return lines({"columns": columns, "rows": rows})
+
+
+def _resistance(tables: list[Table]) -> str:
+    """Confidence intervals of a resistance curve over its parameters."""
+    shares = [f"{100.0 * r[3] / r[2]:.2g}" for r in tables[0]["rows"] if r[0] == "resistance"]
+    return f"{', '.join(shares[:-1])} and {shares[-1]} %"
+
+
 FROM_RUNS: dict[str, tuple[str, Callable[[list[Table]], str]]] = {
     "large_dcb.load": ("large_dcb", lambda t: span(column(t[0], "load / linear"))),
     "large_dcb.elastica": ("large_dcb", lambda t: off(column(t[0], "load / elastica"))),
@@ -98,6 +121,8 @@ FROM_RUNS: dict[str, tuple[str, Callable[[list[Table]], str]]] = {
         "skin_stringer_panel",
         lambda t: off(column(t[0], "/ flat")[:1], 2),
     ),
+    "identify_dcb.table": ("identify_dcb", _identified),
+    "identify_dcb.resistance": ("identify_dcb", _resistance),
     "verify.table": ("verify", lambda t: lines(t[0])),
 }
 """Number: the demo that gives it, and how it follows from the tables that this prints."""

@@ -14,10 +14,12 @@ from __future__ import annotations
 from typing import Any
 
 from fxcrack.base import compat  # isort: skip  # noqa: F401  (orders MPI before DOLFINx)
+import basix
 import dolfinx.la
 import numpy as np
 import ufl
 from dolfinx import fem
+from mpi4py import MPI
 from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
@@ -40,13 +42,18 @@ class BulkViscosity:
 
     Raises:
         InputError: A material has no stiffness to take the wave speed from.
+
+    Attributes:
+        quadratic: b2.
+        changes: Whether it is more than 0, so that damping depends on the motion.
+        rate_of_range: Bound on :meth:`compression` over the range of a velocity, 1/length.
     """
 
     def __init__(
         self, continuum: Continuum, effect: Inertia, linear: float, quadratic: float
     ) -> None:
         self._continuum = continuum
-        self.changes = quadratic > 0.0
+        self.quadratic, self.changes = quadratic, quadratic > 0.0
         domain = continuum.mesh.domain
         self._velocity, self._direction = (fem.Function(continuum.space) for _ in range(2))
         self._vector = fem.Function(continuum.space)
@@ -72,6 +79,38 @@ class BulkViscosity:
             product = self._trace(self._direction) * self._trace(v)
             form += factor * product * continuum.weight * dx
         self._form = fast_form(continuum.comm, form)
+        self._prepare_rates(length, rate)
+
+    def _prepare_rates(self, length: fem.Function, rate: Any) -> None:
+        """Prepare :meth:`compression`; cells count with the square of L over their height."""
+        domain, gdim = self._continuum.mesh.domain, self._continuum.gdim
+        index_map = domain.topology.index_map(domain.topology.dim)
+        self._cells = np.arange(index_map.size_local, dtype=np.int32)
+        size = length.x.array[: len(self._cells)]
+        across = domain.h(domain.topology.dim, self._cells)
+        slender = np.maximum(across / (np.sqrt(gdim) * size), 1.0) ** (2 * (gdim - 1))
+        self._slender = slender[:, None]
+        points, _ = basix.make_quadrature(domain.basix_cell(), 2)
+        self._compression = fem.Expression(ufl.max_value(-rate, 0), points)
+        # strain rates of cells whose nodes move apart by the range of the velocity, about
+        rates = gdim * (slender * np.maximum(across / size, 1.0) ** (gdim - 1) / size)
+        largest = float(rates.max(initial=0.0))
+        self.rate_of_range = float(self._continuum.comm.allreduce(largest, op=MPI.MAX))
+
+    def compression(self, velocity: Array) -> float:
+        """Largest rate of volume decrease of a velocity of the owned dofs, 1/time; collective.
+
+        Rates of slender cells count by the square of the root of their area (volume) over their
+        height, with which quadratic viscosity damps them more.
+        """
+        x = self._velocity.x
+        x.array[: len(velocity)] = velocity
+        x.scatter_forward()
+        largest = 0.0
+        if len(self._cells):
+            found = self._compression.eval(self._continuum.mesh.domain, self._cells)
+            largest = float((np.asarray(found).reshape(len(self._cells), -1) * self._slender).max())
+        return float(self._continuum.comm.allreduce(largest, op=MPI.MAX))
 
     def _trace(self, u: Any) -> Any:
         model = self._continuum.model

@@ -26,6 +26,8 @@ from fxcrack.continuum.continuum import Continuum
 
 LARGE = 0.2
 """Rotation in radians that is not small: half its square is 2 %."""
+LARGE_STRAIN = 0.05
+"""Strain that is not small in bodies that yield: stresses err by 5 %."""
 ENOUGH = 10_000
 """Cells of a rank whose rotation is looked at, about; all below twice as many."""
 STIFF = 0.1
@@ -112,4 +114,33 @@ def warn_of_range(continuum: Continuum, displacement: Array, said: set[str]) -> 
             )
 
 
-__all__ = ["error_of_triangles", "largest_rotation", "warn_of_range"]
+def warn_of_large_strain(continuum: Continuum, displacement: Array, said: set[str]) -> None:
+    """Warn once where bodies that yield have left small strain; collective.
+
+    The strain of plasticity is e = (H + H^t)/2 as well: beside what rotations cost, stresses and
+    areas err by about the strain itself.
+
+    Args:
+        continuum: Solid bodies, some of which yield.
+        displacement: Of the dofs that this rank owns, shape (n_local,), length.
+        said: What was warned of before, "large strain"; it is added to.
+    """
+    n_cells = int(continuum.mesh.domain.topology.index_map(continuum.mesh.tdim).size_local)
+    cells = CellGradients.of(continuum, displacement, every=max(1, n_cells // ENOUGH))
+    angle = largest_rotation(continuum, cells)
+    strain = 0.5 * (cells.gradient + np.swapaxes(cells.gradient, 1, 2))
+    mine = float(np.abs(np.linalg.eigvalsh(strain)).max(initial=0.0))
+    largest = float(max(continuum.comm.allgather(mine)))
+    if (angle > LARGE or largest > LARGE_STRAIN) and "large strain" not in said:
+        said.add("large strain")
+        log.warn(
+            "bodies that yield have strained by up to %.2g and turned by up to %.2g radians, and "
+            "plasticity is for small strain and rotation: stresses and lengths err by up to about "
+            "%.2g %%",
+            largest,
+            angle,
+            100.0 * max(largest, 0.5 * angle**2),
+        )
+
+
+__all__ = ["error_of_triangles", "largest_rotation", "warn_of_large_strain", "warn_of_range"]

@@ -22,7 +22,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
 from fxcrack.continuum.temperature import ByTemperature
@@ -30,6 +29,7 @@ from fxcrack.criteria.front_shift import NextFront, blend_to_tip
 from fxcrack.criteria.probe import FrontProbe, State
 from fxcrack.criteria.ring import Ring
 from fxcrack.criteria.ring_builder import RingBuilder
+from fxcrack.criteria.virtual_extension import FrontLine
 from fxcrack.interface.tips import Tips
 
 RINGS = 3
@@ -75,9 +75,15 @@ class _Rings:
     needed: Ints
     row: dict[int, int]
 
+    def behind(self, i: int, j: int) -> Ring:
+        """The ring that serves tip i on the next front, whose node j is ahead of it."""
+        return self.later[j] if self.later else self.now[i]
+
     @property
     def stretch(self) -> float:
-        """Length of the next front over that of the present one."""
+        """Length of the next front over that of the present one, as the rings have it."""
+        if not self.later:
+            return 1.0
         return sum(r.area for r in self.later) / sum(r.area for r in self.now)
 
 
@@ -111,16 +117,9 @@ class DomainIntegral:
                     f"{where} does not cover stiffness tabulated against temperature; take "
                     "method='vcct' or method='closure'"
                 )
-        if probe.pair.hierarchy is not None:
-            log.warn(
-                "%s on second-order tetrahedra: G of single nodes is off by up to 20 %% and the "
-                "mean of a front is 5 to 10 %% short at 4 elements per radius of the front; take "
-                "method='vcct', which is within 3 %% there",
-                where,
-            )
         self._builder = RingBuilder(probe, rings, length)
         domain = self._bodies.continuum.mesh.domain
-        self._simplices = domain.topology.cell_name() in ("triangle", "tetrahedron")
+        self._cell = domain.topology.cell_name()
         self._of: _Rings | None = None
 
     def prepare(self, tips: Tips) -> _Rings:
@@ -131,14 +130,24 @@ class DomainIntegral:
         here = front.undeformed()
         there = here.tips()
         none = np.zeros(0, dtype=np.int64)
-        now = self._builder.of(here, there, none)
-        known = self._builder.fresh
         order = self._bodies.continuum.order
-        following = NextFront.of(here, there, simplices=self._simplices, order=order)
+        simplices = self._cell in ("triangle", "tetrahedron")
         later: list[Ring] = []
-        if following is not None:
-            later = self._builder.of(following.front, following.tips, following.opened)
-            known = known | self._builder.fresh
+        if self._cell == "tetrahedron":
+            line = FrontLine.of(here, there)
+            following = NextFront.of(here, there, simplices=True, order=order, length=line.length)
+            opened, step = none, 0.0
+            if following is not None:
+                opened, step = following.opened, float(following.step[0])
+            now = self._builder.of(here, there, none, ahead=opened, step=step)
+            known = self._builder.fresh
+        else:
+            now = self._builder.of(here, there, none)
+            known = self._builder.fresh
+            following = NextFront.of(here, there, simplices=simplices, order=order)
+            if following is not None:
+                later = self._builder.of(following.front, following.tips, following.opened)
+                known = known | self._builder.fresh
         self._builder.keep(known)
         needed = np.unique(np.concatenate([r.nodes for r in (*now, *later)]))
         row = {int(node): i for i, node in enumerate(tips.node)}
@@ -171,7 +180,7 @@ class DomainIntegral:
             density = rings.following.to_come(tips, self._probe, state)
             for i, j in enumerate(rings.following.match):
                 if j >= 0:
-                    ring = rings.later[j]
+                    ring = rings.behind(i, j)
                     jump = self._probe.jumps(ring.opening.nodes, after)
                     rows[i] += [_of_nodes(v, rings.needed, ring), density[i], jump.ravel()]
         flat = [np.concatenate(row) for row in rows]
@@ -215,7 +224,7 @@ class DomainIntegral:
         total = ring.energy_rate(u, heat, load, to_come=np.zeros(3), jump=np.zeros((0, 3)))
         following = rings.following
         if following is not None and following.match[row] >= 0:
-            after = rings.later[following.match[row]]
+            after = rings.behind(row, following.match[row])
             first, end = end, end + gdim * len(after.nodes)
             v = measured[first:end].reshape(-1, gdim)
             density = measured[end : end + 3]

@@ -16,6 +16,7 @@ from fxcrack.continuum.loads import Pressure, Traction
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.front_cells import FrontCells
+from fxcrack.interface.hierarchy import Hierarchy
 from fxcrack.interface.surface import FacetSurface, gather_surface, shape_functions
 
 
@@ -178,7 +179,13 @@ class OpenedFacets:
 
 
 def opened_facets(
-    surface: FacetSurface, bonded: Bools, opened: Ints, nodes: Ints, cells: FrontCells, q: Array
+    surface: FacetSurface,
+    bonded: Bools,
+    opened: Ints,
+    nodes: Ints,
+    cells: FrontCells,
+    q: Array,
+    hierarchy: Hierarchy | None = None,
 ) -> OpenedFacets:
     """Facets of the slave face that nodes which have just been released have opened.
 
@@ -189,6 +196,7 @@ def opened_facets(
         nodes: Global displacement nodes of the ring, sorted, shape (n_nodes,).
         cells: Cells of the ring.
         q: Extension at their corners, shape (n_cells, n_corners, gdim).
+        hierarchy: Of the jumps of second-order triangles.
     """
     none = OpenedFacets(np.zeros(0, dtype=np.int64), np.zeros(0))
     if not len(opened):
@@ -199,10 +207,12 @@ def opened_facets(
     at = np.searchsorted(nodes, surface.dofs)
     at = np.where(at < len(nodes), at, 0)
     of_node = np.where((nodes[at] == surface.dofs)[:, None], shift[at], 0.0)
+    if hierarchy is not None:
+        surface = hierarchy.curved(surface)
     corner = surface.facets[:, : surface.n_corners]
-    mine = np.isin(surface.facets, opened)
+    mine = np.isin(corner, opened)
     # those behind the front hold nodes that were open before
-    fresh = mine.any(axis=1) & (mine | bonded[surface.facets]).all(axis=1)
+    fresh = mine.any(axis=1) & (mine | bonded[corner]).all(axis=1)
     moves = (np.abs(of_node).max(axis=1) > 0.0)[corner].any(axis=1)
     rows = np.flatnonzero(fresh & moves)
     if not len(rows):
@@ -211,6 +221,8 @@ def opened_facets(
     each = np.einsum("fqa,fq->fa", at_points.along, at_points.size)
     found = np.zeros(surface.n_nodes)
     np.add.at(found, surface.facets[rows], each)
+    if hierarchy is not None:
+        found = hierarchy.on_whole_jumps(found)
     chosen = np.unique(surface.facets[rows])
     return OpenedFacets(chosen, found[chosen])
 

@@ -19,6 +19,8 @@ import numpy as np
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.criteria.probe import FrontProbe, State, load_density
 from fxcrack.interface.front import Front
+from fxcrack.interface.hierarchy import Hierarchy
+from fxcrack.interface.surface import FacetSurface, triangle_areas
 from fxcrack.interface.tips import Tips
 
 _SHIFT = {
@@ -30,6 +32,14 @@ _SHIFT = {
 """c by mode, for other cells and for simplices, by the order of their displacement: J beside the
 closed form of a centre crack in a wide plate, plane strain, even spacing, 8 elements of first and 4
 of second order along half of it. Mode III is taken as mode II."""
+_SHIFT_OF_TETRAHEDRA = {1: (0.83, 0.57, 1.05), 2: (0.165, 0.137, 0.285)}
+"""c of unstructured tetrahedra likewise, from penny-shaped cracks under tension (Sneddon 1946) and
+shear (Segedin 1951) with 4 and 6 elements of second order and 8 and 12 of first order per radius.
+Those of second order are larger than for other cells, since jumps are linear beside the front."""
+_RAGGED = {1: 1.15, 2: 1.5}
+"""c of the next front over that of the present one, which is smoother."""
+_LOADED = 0.1
+"""Part of the load behind a tip from which on a node ahead is loaded as well."""
 _FAR = 0.6
 """A node of the next front belongs to a tip if it is nearer to its aim than this part of an
 element."""
@@ -61,7 +71,9 @@ class NextFront:
     shift: Array
 
     @classmethod
-    def of(cls, front: Front, tips: Tips, *, simplices: bool, order: int) -> NextFront | None:
+    def of(
+        cls, front: Front, tips: Tips, *, simplices: bool, order: int, length: float | None = None
+    ) -> NextFront | None:
         """The next front; ``None`` where the crack ends.
 
         Args:
@@ -69,6 +81,8 @@ class NextFront:
             tips: Its nodes.
             simplices: Whether the cells are triangles or tetrahedra.
             order: Order of their displacement.
+            length: Length of the front through tetrahedra, where the next one is not as smooth as
+                the present one and means of both are compared; ``None``: node by node.
         """
         moves = (tips.d_ahead > 0.0) & ~tips.ligament
         opened = np.unique(tips.force_nodes[moves])
@@ -82,6 +96,12 @@ class NextFront:
         aim = surface.x[tips.node] + tips.d_ahead[:, None] * tips.frame[:, :, 1]
         away = np.linalg.norm(aim[:, None] - surface.x[later.node], axis=2)
         match = away.argmin(axis=1)
+        if length is not None:
+            n = len(tips)
+            size = np.full(n, 0.5 * float(np.mean(tips.d_ahead + tips.d_behind)))
+            step = np.full(n, _area(surface, after.bonded, front.bonded) / length)
+            shift = np.array(_SHIFT_OF_TETRAHEDRA[order])
+            return cls(after, later, opened, match, size, _RAGGED[order] * size, step, shift)
         near = away[range(len(tips)), match] <= _FAR * tips.d_ahead
         near &= ~later.ligament[match] & (later.d_ahead[match] > 0.0)
         return cls(
@@ -128,7 +148,10 @@ class NextFront:
             midsides = hierarchy.opened_by(probe.front.bonded, nodes)
             nodes = np.append(nodes, midsides)
             closed = np.append(closed, np.zeros(len(midsides), dtype=bool))
-            pulls = np.concatenate([pulls, probe.bond_forces(midsides, state)])
+            held = probe.bond_forces(midsides, state)
+            if probe.has_face_loads:
+                held = held + _loads_on_midsides(hierarchy, midsides, tips, probe, state)
+            pulls = np.concatenate([pulls, held])
         return nodes, closed, pulls
 
     def to_come(self, tips: Tips, probe: FrontProbe, state: State) -> Array:
@@ -138,9 +161,39 @@ class NextFront:
         """
         if not probe.has_face_loads:
             return np.zeros((len(tips), 3))
-        ahead = probe.face_loads(self.tips.node[self.match], state)
-        loaded = np.any(ahead, axis=1, keepdims=True)
-        return np.where(loaded, 0.0, load_density(probe, tips, state))
+        nodes, density = self.tips.node[self.match], load_density(probe, tips, state)
+        ahead = np.linalg.norm(probe.face_loads(nodes, state), axis=1)
+        # the edge of a load may lie beyond that of a curved element by a little
+        whole = probe.pair.surface.areas[nodes] * np.linalg.norm(density, axis=1)
+        return np.where((ahead > _LOADED * whole)[:, None], 0.0, density)
+
+
+def _loads_on_midsides(
+    hierarchy: Hierarchy, midsides: Ints, tips: Tips, probe: FrontProbe, state: State
+) -> Array:
+    """Loads on the faces about to open that belong to their midside jumps, shape (n, 3) [force].
+
+    The function of an edge has a third of the area of each of its two triangles.
+    """
+    surface = probe.pair.surface
+    density = np.zeros((surface.n_nodes, 3))
+    density[tips.node] = load_density(probe, tips, state)
+    ends = hierarchy.ends[np.searchsorted(hierarchy.midsides, midsides)]
+    known = np.isin(ends, tips.node).sum(axis=1, keepdims=True)
+    mean = density[ends].sum(axis=1) / np.maximum(known, 1)
+    corner = surface.facets
+    areas = triangle_areas(surface.x[corner])
+    out = np.zeros(len(midsides))
+    for k, (a, b) in enumerate(ends):
+        out[k] = areas[(corner == a).any(axis=1) & (corner == b).any(axis=1)].sum() / 3.0
+    return np.asarray(out[:, None] * mean)
+
+
+def _area(surface: FacetSurface, bonded: Bools, before: Bools) -> float:
+    """Area of the triangles that have an open corner but had none before [length^2]."""
+    corner = surface.facets[:, : surface.n_corners]
+    fresh = ~bonded[corner].all(axis=1) & before[corner].all(axis=1)
+    return float(triangle_areas(surface.x[corner[fresh]]).sum())
 
 
 def blend_to_tip(here: float, there: float, weight: float) -> float:

@@ -22,6 +22,7 @@ class Interaction:
         by_load: What each load factor does, shape (n_modes, n_loads).
         energy: M of G = k . M k, shape (n_modes, n_modes).
         oscillation: Oscillation index of the two materials.
+        share: Area that the extension of these integrals opens over that of the ring's energy.
     """
 
     by_node: Array
@@ -29,6 +30,7 @@ class Interaction:
     by_load: Array
     energy: Array
     oscillation: float
+    share: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -112,7 +114,7 @@ class Ring:
         weights = self.interaction
         found = np.einsum("mnc,nc->m", weights.by_node, u)
         found = found + weights.by_rise @ heat + weights.by_load @ load
-        half = 0.5 * found / self.area
+        half = 0.5 * found / (self.area * weights.share)
         k = np.linalg.solve(weights.energy, half)
         parts, every = np.zeros(3), np.zeros(3)
         parts[: len(k)], every[: len(k)] = k * half, k

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import FaceTractions, loads_on_faces, opened_facets
 from fxcrack.criteria.front_ring import FIELDS_DEGREE, CellGeometry, TipState, divergence_in_rings
+from fxcrack.criteria.front_smoothing import smoothing
 from fxcrack.criteria.outer_faces import node_positions, outer_faces
 from fxcrack.criteria.probe import FrontProbe
 from fxcrack.criteria.ring import Interaction, Ring
@@ -27,9 +29,40 @@ from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.surface import gather_surface
 from fxcrack.interface.tips import Tips
 
+_OPENING = 1
+"""Place of mode I among the fields of a tip."""
 _STRAIGHT = 30.0
 """Turn of the front from one element to the next above which single nodes are not reliable
 [degrees]; a circle has 15 with 24 elements around it."""
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A tip of a front for which a ring is made.
+
+    Attributes:
+        front: The front.
+        tips: Its nodes.
+        i: The tip.
+        line: The front as segments.
+        modes: The tip whose modes it has: itself, or the one beside it. The fields of a tip do not
+            fit to a plane of symmetry at the end of a front, where one of mode III pulls.
+        size: How far the cells at the tip reach [length].
+        opened: Nodes that have opened before this front, or are about to, shape (n,).
+        weights: Of the extensions of all tips in that of this one, shape (n_tips,); ``None``: its
+            own alone.
+        step: How far the front behind the nodes about to open is ahead [length].
+    """
+
+    front: Front
+    tips: Tips
+    i: int
+    line: FrontLine
+    modes: int
+    size: float
+    opened: Ints
+    weights: Array | None
+    step: float
 
 
 class RingBuilder:
@@ -55,15 +88,25 @@ class RingBuilder:
         self._on_faces = loads_on_faces(continuum, self._loads)
         self._slaves = probe.pair.surface.dofs
         master = probe.pair.sides[1]
-        assert isinstance(master, str | Face)  # rigid surfaces are refused before
-        self._masters = gather_surface(continuum, master).dofs
+        self._masters = np.zeros(0, dtype=np.int64)  # a plane of symmetry has no nodes
+        if isinstance(master, str | Face):
+            self._masters = gather_surface(continuum, master).dofs
+        self._halves = probe.pair.interface.opening_factor
         self._ring = isinstance(continuum.model, Axisymmetric)
         self._thickness = float(getattr(continuum.model, "thickness", 1.0))
         self._n_modes = 2 if probe.gdim == 2 else 3
         self._known: dict[tuple[Any, ...], Ring] = {}
         self._said: set[str] = set()
 
-    def of(self, front: Front, tips: Tips, opened: Ints) -> list[Ring]:
+    def of(
+        self,
+        front: Front,
+        tips: Tips,
+        opened: Ints,
+        *,
+        ahead: Ints | None = None,
+        step: float = 0.0,
+    ) -> list[Ring]:
         """The rings of a front where the bodies are undeformed; collective.
 
         Args:
@@ -71,10 +114,14 @@ class RingBuilder:
             tips: Its nodes there.
             opened: Nodes that were bonded and are open on this front, shape (n,); intensity factors
                 are for fronts without such nodes.
+            ahead: Of a front through irregular cells the nodes that are about to open, shape (n,):
+                the rings serve the front behind them as well, and give rates that are smooth along
+                the front.
+            step: How far that front is ahead [length].
         """
         gdim = self._probe.gdim
-        line = FrontLine.of(front, tips)
         pair, surface = self._probe.pair, front.surface
+        line = FrontLine.of(front, tips, pair.hierarchy)
         if not len(opened):
             self._look_at_turning(line)
         x = surface.x[tips.node]
@@ -90,12 +137,23 @@ class RingBuilder:
         wide = float(np.hypot(self._rings * size.max(initial=0.0), 0.5 * reach))
         cells = self._cells.near(x[:, :gdim], np.full(len(x), wide))
         corners = Corners(cells, line)
+        weights = None
+        if ahead is not None:
+            along = corners.allowed(surface.dofs[tips.node], line.directions(tips))
+            tips = replace(tips, frame=_turned(tips.frame, along))
+            areas = np.array([line.widths(tips, i) for i in range(len(tips))])
+            weights = smoothing(line.x, line.segments, areas)
+            # nodes about to open change what their rings need
+            opened, reach = ahead, np.inf
         rings, known = [], {}
         for i in range(len(tips)):
             key = self._key(front, tips, i, wide + reach, float(size[i]), opened)
             ring = self._known.get(key)
             if ring is None:
-                ring = self._make(front, tips, i, line, cells, corners, float(size[i]), opened)
+                row = None if weights is None else weights[i] * areas[i] / areas
+                beside = i if row is None else line.inward(i)
+                where = _Place(front, tips, i, line, beside, float(size[i]), opened, row, step)
+                ring = self._make(where, cells, corners)
             known[key] = ring
             rings.append(ring)
         self._fresh = known
@@ -123,27 +181,26 @@ class RingBuilder:
             float(tips.width[i]),
         )  # fmt: skip
 
-    def _make(
-        self,
-        front: Front,
-        tips: Tips,
-        i: int,
-        line: FrontLine,
-        cells: FrontCells,
-        corners: Corners,
-        size: float,
-        opened: Ints,
-    ) -> Ring:
+    def _make(self, at: _Place, cells: FrontCells, corners: Corners) -> Ring:
         """The largest ring of a tip with one material on each side, of one layer at least."""
-        size *= 1.0 + 1e-6
-        normal = tips.frame[i, :, 0]
-        origin = front.surface.x[tips.node[i]]
+        i, size = at.i, at.size * (1.0 + 1e-6)
+        normal = at.tips.frame[i, :, 0]
+        origin = at.front.surface.x[at.tips.node[i]]
         centre = np.zeros((len(cells.nodes), 3))
         centre[:, : self._probe.gdim] = cells.corners.mean(axis=1)
         above = (centre - origin) @ normal > 0.0
+        hat = np.zeros(len(at.tips))
+        hat[at.line.members[at.modes]] = 1.0
+        alone = np.broadcast_to(at.tips.frame[at.modes, :, 1], (len(at.tips), 3))
         for layers in range(self._rings, 0, -1):
             core = size if layers > 1 else 0.0
-            q = corners.extension(tips, i, layers * size, core)[corners.of_cell]
+            q = corners.extension(hat, alone, layers * size, core)[corners.of_cell]
+            wide = q
+            if at.weights is not None:
+                core = min(core + at.step, max(layers - 1, 0) * size)
+                wide = corners.extension(at.weights, at.tips.frame[:, :, 1], layers * size, core)[
+                    corners.of_cell
+                ]
             rows = np.flatnonzero(np.abs(q).max(axis=(1, 2)) > 0.0)
             parts = [np.unique(cells.part[rows[above[rows] == side]]) for side in (True, False)]
             # a side without cells has no material that could differ
@@ -169,53 +226,83 @@ class RingBuilder:
             )
         if not all(len(p) for p in parts):
             parts = [p if len(p) else parts[1 - k] for k, p in enumerate(parts)]
+        rows = np.flatnonzero((np.abs(q) + np.abs(wide)).max(axis=(1, 2)) > 0.0)
         return self._fill(
-            front, tips, i, line, cells.chosen(rows), q[rows], above[rows],
-            [int(p[0]) for p in parts], alike, opened,
+            at, cells.chosen(rows), q[rows], wide[rows], above[rows], [int(p[0]) for p in parts],
+            alike,
         )  # fmt: skip
 
     def _fill(
         self,
-        front: Front,
-        tips: Tips,
-        i: int,
-        line: FrontLine,
+        at: _Place,
         cells: FrontCells,
         q: Array,
+        wide: Array,
         above: Bools,
         parts: list[int],
         alike: bool,
-        opened: Ints,
     ) -> Ring:
-        """A ring of given cells and extension at their corners."""
+        """A ring of given cells and extensions at their corners.
+
+        Args:
+            at: The tip.
+            cells: The cells.
+            q: Extension from which the modes are found, shape (n_cells, n_corners, gdim).
+            wide: That of the energy, likewise.
+            above: Whether each cell is on the side the normal points to, shape (n_cells,).
+            parts: Part of the continuum that gives the crack-tip field above and below.
+            alike: Whether each side is of one material.
+        """
         continuum, gdim = self._continuum, self._probe.gdim
+        front, tips, i = at.front, at.tips, at.i
         nodes, of_cell = np.unique(cells.nodes, return_inverse=True)
         of_cell = of_cell.reshape(cells.nodes.shape)
         x = np.zeros((len(nodes), 3))
         x[of_cell] = node_positions(cells)
+        n_loads = len(self._loads)
         laws = CellLaws(self._laws, cells.part, finite=self._bodies.finite)
-        faces = FaceTractions(self._on_faces, q, cells, above, nodes, len(self._loads), gdim=gdim)
+        faces = FaceTractions(self._on_faces, wide, cells, above, nodes, n_loads, gdim=gdim)
         fields = None
-        if not len(opened):
+        if at.weights is not None or not len(at.opened):
             length = self._length or float(tips.d_behind[i])
             upper, lower = (self._laws[p].whole for p in parts)
-            fields = TipFields(upper, lower, tips.frame[i], length)
+            fields = TipFields(upper, lower, tips.frame[at.modes], length)
             self._look_at_oscillation(fields.oscillation, length)
-        origin = front.surface.x[tips.node[i]]
-        interaction = self._interaction(fields, origin, cells, q, above, laws, faces, of_cell)
-        area = line.widths(tips, i)
+        origin = front.surface.x[tips.node[at.modes]]
+        area = at.line.widths(tips, i)
         if gdim == 2:
             area = float(continuum.model.breadth(origin[None])[0])
-        opening = opened_facets(front.surface, front.bonded, opened, nodes, cells, q)
+        if at.weights is None:
+            interaction = self._interaction(fields, origin, cells, q, above, laws, faces, of_cell)
+        else:
+            some = np.flatnonzero(np.abs(q).max(axis=(1, 2)) > 0.0)
+            few = cells.chosen(some)
+            pulled = FaceTractions(
+                self._on_faces, q[some], few, above[some], nodes, n_loads, gdim=gdim
+            )
+            interaction = self._interaction(
+                fields, origin, few, q[some], above[some],
+                CellLaws(self._laws, few.part, finite=self._bodies.finite), pulled, of_cell[some],
+                len(nodes),
+            )  # fmt: skip
+            share = at.line.widths(tips, at.modes) / area
+            interaction = replace(interaction, share=share)
+        opening = opened_facets(
+            front.surface, front.bonded, at.opened, nodes, cells, wide, self._probe.pair.hierarchy
+        )
+        # half a ring: J and K_I of the other half are the same, as if over half the area; jumps are
+        # those of the whole crack
+        area /= self._halves
+        opening = replace(opening, weights=opening.weights / self._halves)
         # as the bodies have it
         plain = CellGeometry(cells, continuum.degree, ring=self._ring, thickness=self._thickness)
         volume = plain.weight
-        shift = plain.at_corners(q) * volume[..., None]
+        shift = plain.at_corners(wide) * volume[..., None]
         rise, slope = self._temperatures(cells, plain, shift)
         body, _ = self._body(cells, plain, shift, np.zeros((1, *volume.shape, 3, 3)))
         return Ring(
             nodes, of_cell, plain, x[:, :gdim], laws,
-            plain.gradient(q, corners=True) * volume[..., None, None], rise, slope, body, faces,
+            plain.gradient(wide, corners=True) * volume[..., None, None], rise, slope, body, faces,
             opening, interaction, area, alike,
         )  # fmt: skip
 
@@ -229,9 +316,11 @@ class RingBuilder:
         laws: CellLaws,
         faces: FaceTractions,
         of_cell: Ints,
+        n_nodes: int = 0,
     ) -> Interaction:
         """The interaction integrals; nothing where no fields are given."""
-        m, n_nodes, gdim = self._n_modes, int(of_cell.max()) + 1, self._probe.gdim
+        m, gdim = self._n_modes, self._probe.gdim
+        n_nodes = max(n_nodes, int(of_cell.max()) + 1)
         if fields is None:
             none = np.zeros(0)
             return Interaction(none, none, none, np.eye(m), 0.0)
@@ -270,6 +359,10 @@ class RingBuilder:
         for mode in range(m):
             np.add.at(by_node[mode], of_cell, each[mode])
         energy = fields.energy[:m, :m]
+        if self._halves > 1.0:
+            # modes II and III of one half are the negative of those of the other
+            for weights in (by_node, by_rise, by_load):
+                weights[np.arange(m) != _OPENING] = 0.0
         return Interaction(by_node, by_rise, by_load, energy, fields.oscillation)
 
     def _own_facets(self, cells: FrontCells) -> Bools:
@@ -349,6 +442,13 @@ class RingBuilder:
                 oscillation,
                 length,
             )
+
+
+def _turned(frame: Array, along: Array) -> Array:
+    """Frames with these directions of growth, shape (n, 3, 3)."""
+    normal = frame[:, :, 0] - np.einsum("ni,ni->n", frame[:, :, 0], along)[:, None] * along
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    return np.stack([normal, along, np.cross(normal, along)], axis=2)
 
 
 def _reach(line: FrontLine) -> float:

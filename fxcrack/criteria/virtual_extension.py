@@ -16,12 +16,15 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.interface.front import Front
 from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.front_order import ordered_fronts
+from fxcrack.interface.hierarchy import Hierarchy
 from fxcrack.interface.tips import Tips
 
 _ONE_FACE = 0.75
 """Cosine between the normals of two facets of one smooth face, at least; at edges it is less."""
 _NOTHING = 1e-6
 """Extensions below this are zero."""
+_SOME = 0.1
+"""Part of a direction at least that must be left where a corner may not move freely."""
 
 
 @dataclass(frozen=True)
@@ -34,20 +37,24 @@ class FrontLine:
             for a point, shape (n_segments, 2).
         members: Corner tips that stand for each tip: itself, or those beside a midside node.
         dim: Dimension of the interface, 1 or 2.
+        bulge: From the middle of each segment to the midside node of its edge, shape (n_segments,
+            3) [length]; zero where the edge is straight or has none in the hierarchy of jumps.
     """
 
     x: Array
     segments: Ints
     members: list[Ints]
     dim: int
+    bulge: Array
 
     @classmethod
-    def of(cls, front: Front, tips: Tips) -> FrontLine:
+    def of(cls, front: Front, tips: Tips, hierarchy: Hierarchy | None = None) -> FrontLine:
         """The line of a present front.
 
         Args:
             front: The front.
             tips: Its nodes.
+            hierarchy: Midside nodes of second-order tetrahedra, which are no tips.
         """
         surface = front.surface
         x = surface.x[tips.node]
@@ -73,7 +80,51 @@ class FrontLine:
             away = np.linalg.norm(x[corners] - x[tip], axis=1)
             near = np.flatnonzero(corners)[np.argsort(away, kind="stable")[:2]]
             members.append(np.sort(near))
-        return cls(x, found, members, surface.dim)
+        bulge = np.zeros((len(found), 3))
+        if hierarchy is not None:
+            ends = [tuple(sorted(k)) for k in hierarchy.ends.tolist()]
+            middle = dict(zip(ends, surface.x[hierarchy.midsides], strict=True))
+            for k, (a, b) in enumerate(tips.node[found].tolist()):
+                at_middle = middle.get((min(a, b), max(a, b)))
+                if at_middle is not None:
+                    bulge[k] = at_middle - 0.5 * (surface.x[a] + surface.x[b])
+        return cls(x, found, members, surface.dim, bulge)
+
+    @property
+    def length(self) -> float:
+        """Sum of the segments [length]."""
+        ends = self.x[self.segments]
+        return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
+
+    def inward(self, i: int) -> int:
+        """The tip beside one at the end of the front; any other tip itself."""
+        mine = self.segments[(self.segments == i).any(axis=1)]
+        if len(mine) != 1:
+            return i
+        a, b = mine[0].tolist()
+        return int(b if a == i else a)
+
+    def directions(self, tips: Tips) -> Array:
+        """Directions of growth: those of the tips, but normal to the segments beside them.
+
+        Where cells are irregular the former are several degrees off, which would move the front
+        along itself. Shape (n_tips, 3).
+
+        Args:
+            tips: Front nodes.
+        """
+        out = tips.frame[:, :, 1].copy()
+        if self.dim == 1:
+            return out
+        total = np.zeros_like(out)
+        for a, b in self.segments:
+            for tip in (a, b):
+                across = np.cross(tips.frame[tip, :, 0], self.x[b] - self.x[a])
+                total[tip] += across if across @ out[tip] > 0.0 else -across
+        size = np.linalg.norm(total, axis=1)
+        known = size > 0.0
+        out[known] = total[known] / size[known, None]
+        return out
 
     def widths(self, tips: Tips, i: int) -> float:
         """Area that the extension of a tip opens per length, in the direction it grows [length].
@@ -84,12 +135,15 @@ class FrontLine:
         total, swept = 0.0, 0.0
         normal, growth = tips.frame[i, :, 0], tips.frame[i, :, 1]
         for member in self.members[i]:
-            for a, b in self.segments[(self.segments == member).any(axis=1)]:
+            for k in np.flatnonzero((self.segments == member).any(axis=1)):
+                a, b = self.segments[k]
                 if a == b:
                     total += 1.0 if self.dim == 1 else float(tips.width[i])
                 else:  # segments run along the front: one that is swept backwards counts as such
-                    chord = self.x[b] - self.x[a]
-                    swept += 0.5 * float(np.cross(normal, chord) @ growth)
+                    # int (1 - t) dx or int t dx of the parabola through the midside node
+                    bent = (4.0 / 3.0) * self.bulge[k] * (1.0 if a == member else -1.0)
+                    along = self.x[b] - self.x[a] + bent
+                    swept += 0.5 * float(np.cross(normal, along) @ growth)
         return total + abs(swept)
 
     def turning(self) -> tuple[float, int]:
@@ -178,27 +232,49 @@ class Corners:
                 _add(groups.setdefault(corner, []), normal[: self._gdim])
         return {corner: _orthonormal(found) for corner, found in groups.items()}
 
-    def extension(self, tips: Tips, i: int, radius: float, core: float) -> Array:
-        """Extension of a tip at the corners, shape (n_corners, gdim).
+    def allowed(self, nodes: Ints, directions: Array) -> Array:
+        """Directions at some corners as far as these may move there, of length 1.
+
+        One that is not allowed at all stays as it is.
 
         Args:
-            tips: Front nodes.
-            i: Which of them.
+            nodes: Global displacement nodes, shape (n,).
+            directions: Shape (n, 3).
+        """
+        out = directions.copy()
+        at = np.searchsorted(self.node, nodes)
+        for i, corner in enumerate(at.tolist()):
+            known = corner < len(self.node) and self.node[corner] == nodes[i]
+            fixed = self._fixed.get(corner) if known else None
+            if fixed is None:
+                continue
+            moved = out[i].copy()
+            moved[: self._gdim] -= (fixed @ moved[: self._gdim]) @ fixed
+            size = float(np.linalg.norm(moved))
+            if size > _SOME:
+                out[i] = moved / size
+        return out
+
+    def extension(self, weights: Array, directions: Array, radius: float, core: float) -> Array:
+        """Extension at the corners, shape (n_corners, gdim).
+
+        Args:
+            weights: Of the hat functions of the tips along the front, shape (n_tips,).
+            directions: In which they move, shape (n_tips, 3).
             radius: Where it has fallen to zero [length].
             core: Where it begins to fall [length].
         """
-        inside = np.isin(self._tips, self._line.members[i])
-        same = self._tips[:, 0] == self._tips[:, 1]
-        share = np.where(same, inside[:, 0], (self._shares * inside).sum(axis=1))
         fall = np.clip((radius - self.distance) / (radius - core), 0.0, 1.0)
-        size = share * fall
-        size[size < _NOTHING] = 0.0
-        q = size[:, None] * tips.frame[i, : self._gdim, 1]
-        for corner in np.flatnonzero(size):
+        share = self._shares.copy()
+        share[self._tips[:, 0] == self._tips[:, 1], 1] = 0.0
+        share *= weights[self._tips] * fall[:, None]
+        share[np.abs(share) < _NOTHING] = 0.0
+        q = np.einsum("nk,nkc->nc", share, directions[self._tips][..., : self._gdim])
+        for corner in np.flatnonzero(share.any(axis=1)):
             fixed = self._fixed.get(int(corner))
             if fixed is not None:
                 q[corner] -= (fixed @ q[corner]) @ fixed
-        return q
+        return np.asarray(q)
 
 
 def _add(groups: list[Array], normal: Array) -> None:

@@ -91,6 +91,13 @@ def stopped(history: History, step: DeckStep) -> bool:
 def _help(reason: str, step: DeckStep) -> str:
     """What would help, by cards and parameters."""
     if isinstance(step.step, Explicit):
+        if step.step.dt is not None:
+            return (
+                "a shorter increment on the data line of *DYNAMIC, EXPLICIT, DIRECT USER CONTROL "
+                "(0.8 times as long, say), or leaving out DIRECT USER CONTROL lets increments "
+                "follow the stable one, and *BULK VISCOSITY with 0., 0. leaves out the viscosity "
+                "that shortens it"
+            )
         return (
             "SCALE FACTOR of *DYNAMIC, EXPLICIT gives smaller increments (it is the safety over "
             f"{SAFETY:g}: SCALE FACTOR={0.8 * step.step.safety / SAFETY:.2g} for increments 0.8 "

@@ -40,7 +40,7 @@ def continuing(flat: Flat, surfaces: Sequence[Ints]) -> list[list[int]]:
     n = len(surfaces)
     if n < 2:
         return []
-    normals = [_normals(flat, rows) for rows in surfaces]
+    normals = [facet_normals(flat, rows) for rows in surfaces]
     links = []
     for i in range(n):
         for j in range(i + 1, n):
@@ -59,7 +59,7 @@ def continuing(flat: Flat, surfaces: Sequence[Ints]) -> list[list[int]]:
     return [members for members in found if len(members) > 1]
 
 
-def _normals(flat: Flat, rows: Ints) -> Array:
+def facet_normals(flat: Flat, rows: Ints) -> Array:
     """Unit normals of facets, up to their sign, shape (n, 3)."""
     x = flat.points[rows]
     if flat.kind.tdim == 2:
@@ -227,4 +227,4 @@ def _values(part: PairDef, value: object, x: Array) -> Array:
     return np.full(len(x), float(value))
 
 
-__all__ = ["continuing", "join_pairs", "joined_criterion"]
+__all__ = ["continuing", "facet_normals", "join_pairs", "joined_criterion"]

@@ -3,6 +3,7 @@
 * Materials and interactions that nothing names, whatever they hold.
 * Steps of perturbation (frequencies, buckling loads) beside general ones: the other steps begin and
   end as if they were not there.
+* Field variables on which nothing depends, and the state variables of user subroutines.
 * Point masses in a static deck without gravity.
 """
 
@@ -37,7 +38,7 @@ def without_unused(cards: Sequence[Card], report: Report) -> list[Card]:
     kept = _families(
         kept, report, "SURFACEINTERACTION", OF_INTERACTIONS, _named_interactions(cards)
     )
-    return _point_masses(_perturbations(kept, report), report)
+    return _point_masses(_perturbations(_fields(kept, report), report), report)
 
 
 def _named_materials(cards: Sequence[Card]) -> set[str]:
@@ -81,6 +82,20 @@ def _families(
             elsewhere = known is not None and known.kind in ("read", "output")
             inside = card.keyword in members or not elsewhere
         if not inside:
+            kept.append(card)
+    return kept
+
+
+def _fields(cards: Sequence[Card], report: Report) -> list[Card]:
+    """The cards without field variables, where no property depends on them."""
+    if any(card.has("DEPENDENCIES") for card in cards):
+        return list(cards)
+    kept = []
+    for card in cards:
+        initial = card.keyword == "INITIALCONDITIONS" and card.word("TYPE") in ("FIELD", "SOLUTION")
+        if card.keyword == "FIELD" or initial:
+            report.leave(f"{card.title} of fields or states on which nothing depends")
+        else:
             kept.append(card)
     return kept
 

@@ -23,6 +23,7 @@ from fxcrack.deck.cards import Card, Row, key, label, squeeze
 from fxcrack.deck.constraints import Carrier
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
+from fxcrack.deck.joined_pairs import facet_normals
 from fxcrack.deck.load_fields import Centrifugal, Hydrostatic
 from fxcrack.deck.report import Report
 from fxcrack.deck.thermal import NodalField
@@ -30,6 +31,8 @@ from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track
 from fxcrack.deck.transforms import Transforms
 
 _BODY = {"BX": 0, "BY": 1, "BZ": 2}
+_FLAT = 1e-6
+"""Difference of unit normals that are the same."""
 _KINDS = ("CLOAD", "DLOAD", "DSLOAD")
 
 
@@ -146,8 +149,10 @@ class Loads:
             row.fail(f"load type {word} needs a user subroutine; give its values")
         entry = LoadEntry(row, card.keyword, label(name), word)
         follower = card.word("FOLLOWER", "YES")
-        if card.keyword == "DSLOAD" and word not in ("P", "TRVEC", "HP"):
-            row.fail(f"load type {row.text(1)} is not available on surfaces; P, HP and TRVEC are")
+        if card.keyword == "DSLOAD" and word not in ("P", "TRVEC", "TRSHR", "HP"):
+            row.fail(
+                f"load type {row.text(1)} is not available on surfaces; P, HP, TRVEC and TRSHR are"
+            )
         if word in ("P", "HP") or (word[:1] == "P" and word[1:].isdigit()) or (
             word[:2] == "HP" and word[2:].isdigit()
         ):  # fmt: skip
@@ -161,8 +166,10 @@ class Loads:
                 entry.zero = (row.number(3), row.number(4))
                 if entry.zero[0] == entry.zero[1]:
                     row.fail("the two levels of a hydrostatic pressure are the same")
-        elif word == "TRVEC":
+        elif word in ("TRVEC", "TRSHR"):
             entry.direction = self._direction(row, 3)
+            if word == "TRSHR":
+                entry.direction = self._along_surface(row, entry.direction)
             if self._finite and follower == "YES":
                 row.fail("a traction that turns with the body is not available; add FOLLOWER=NO")
             if self._finite and card.word("CONSTANT RESULTANT", "NO") not in ("", "YES"):
@@ -195,6 +202,21 @@ class Loads:
         if not found.any():
             row.fail("the direction of the load is missing; give its components")
         return tuple(float(c) for c in found / np.linalg.norm(found))
+
+    def _along_surface(self, row: Row, direction: tuple[float, ...]) -> tuple[float, ...]:
+        """The direction of a shear traction: the given one, projected on a flat surface."""
+        flat = self._flat
+        if flat.kind.shell:
+            row.fail("TRSHR is not available on shells; give TRVEC with a direction along them")
+        rows = flat.surface(row.card, row.text(0), row.index)
+        normals = facet_normals(flat, rows)
+        along = np.array(direction) - normals * (normals @ np.array(direction))[:, None]
+        if np.abs(np.abs(normals @ normals[0]) - 1.0).max() > _FLAT:
+            row.fail("TRSHR is available on flat surfaces; divide it into flat ones, or give TRVEC")
+        size = float(np.linalg.norm(along[0]))
+        if size <= _FLAT:
+            row.fail("the direction is that of the normal; give one along the surface")
+        return tuple((along[0] / size).tolist())
 
     def _axis_of_rotation(self, row: Row) -> tuple[tuple[float, ...], tuple[float, ...]]:
         """A point of the axis and its direction; in a plane z, of bodies of revolution y."""
@@ -348,7 +370,7 @@ class Loads:
 
         if entry.kind == "DSLOAD":
             where = groups.surface(card, entry.name, entry.row.index)
-            if entry.type == "TRVEC" and flat.kind.shell:
+            if entry.type in ("TRVEC", "TRSHR") and flat.kind.shell:
                 self._report.replace(
                     "the traction acts on the face of the shell, not on its reference surface", card
                 )
@@ -406,7 +428,7 @@ class Loads:
     def _on_facets(
         self, entry: LoadEntry, where: str | Face, value: float, amplitude: AmplitudeLike, name: str
     ) -> Load:
-        if entry.type == "TRVEC":
+        if entry.type in ("TRVEC", "TRSHR"):
             traction = tuple(value * d for d in entry.direction[: self._flat.kind.gdim])
             return Traction(where, traction, amplitude, name)
         if entry.type[:2] == "HP":

@@ -10,7 +10,6 @@ import numpy as np
 
 from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import Monitor
-from fxcrack.continuum.materials import Plastic
 from fxcrack.deck.cards import Card, DeckError, key, label, squeeze
 from fxcrack.deck.constraints import read_constraints
 from fxcrack.deck.contact import Contacts
@@ -108,7 +107,7 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     groups = Groups(flat)
     cards = _model_cards(flat)
     _check_steps(model.steps, explicit=explicit)
-    finite = _finite(model.steps, procedures, report)
+    finite = _finite(model, procedures, report)
     periods = [p.period for p in procedures]
     amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
     boundary = Boundary(flat, periods)
@@ -140,7 +139,6 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     if stresses.card is not None and temperatures.first is not None:
         stresses.card.fail("initial stresses beside temperatures are not available; leave one out")
     sections = read_sections(flat, groups, report, stresses)
-    _check_finite(finite, sections, model)
     if flat.kind.shell:
         check_shells(loads)
     moving = [p for p in procedures if p.inertia is not None]
@@ -267,27 +265,34 @@ def _initial(cards: Sequence[Card], kind: str) -> list[Card]:
     return found
 
 
-def _finite(steps: Sequence[Family], procedures: Sequence[Procedure], report: Report) -> bool:
-    """Whether bodies turn far; in all steps if in one."""
+def _finite(model: Model, procedures: Sequence[Procedure], report: Report) -> bool:
+    """Whether bodies turn far; in all steps if in one, and not where they yield.
+
+    Raises:
+        DeckError: Bodies that yield stand beside others that are made for large strain.
+    """
     finite = [p.finite for p in procedures]
-    if any(finite) and not all(finite):
+    if not any(finite):
+        return False
+    yielding = next((c for m in model.materials.values() if (c := m.first("PLASTIC"))), None)
+    if yielding is not None:
+        if any(m.first("HYPERELASTIC") for m in model.materials.values()):
+            yielding.fail(
+                "plasticity is for small strain and cannot stand beside *HYPERELASTIC with NLGEOM; "
+                "leave one of them out"
+            )
+        report.replace(
+            "plasticity is for small strain: the deck is computed as with NLGEOM=NO; rotations and "
+            "strains that are not small are warned of at the end of each step",
+            yielding,
+        )
+        return False
+    if not all(finite):
         report.replace(
             "NLGEOM counts from the first step on: all steps have large rotations, or none",
-            steps[finite.index(True)].card,
+            model.steps[finite.index(True)].card,
         )
-    return any(finite)
-
-
-def _check_finite(finite: bool, sections: Sections, model: Model) -> None:
-    """Refuse plasticity beside large rotations."""
-    if finite and any(isinstance(m, Plastic) for m in sections.materials.values()):
-        for family in model.materials.values():
-            card = family.first("PLASTIC")
-            if card is not None:
-                card.fail(
-                    "plasticity is for small strain and cannot stand beside NLGEOM=YES; write "
-                    "NLGEOM=NO in all steps, or leave *PLASTIC out"
-                )
+    return True
 
 
 def _effects(

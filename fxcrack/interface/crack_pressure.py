@@ -8,6 +8,9 @@ coordinates that is a force on the opening alone,
 
 so that it does nothing where the faces are bonded (their jumps are zero) and acts on every node
 from its release on. Its conjugate is the volume between the faces for p = 1: what was injected.
+On second-order tetrahedra W is that of the whole jump of each node, and so is the opening; what the
+forces of midside nodes do with the jumps of their corners comes with the jump coordinates
+(:mod:`fxcrack.interface.hierarchy`).
 
 Bond forces are found from the equilibrium of a node and so contain p times the area that is still
 bonded; :meth:`CrackPressure.under_bonds` says how much that is.
@@ -16,7 +19,7 @@ bonded; :meth:`CrackPressure.under_bonds` says how much that is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import basix
 import numpy as np
@@ -31,7 +34,7 @@ from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
-from fxcrack.interface.surface import shape_functions
+from fxcrack.interface.surface import FacetSurface, shape_functions
 
 _ACROSS = 1e-8
 """Components of a normal below this are none."""
@@ -89,11 +92,6 @@ class CrackPressure:
                 f"give the name of one of them ({names})"
             )
         pair = pairs[found[0]]
-        if pair.hierarchy is not None:
-            raise InputError(
-                f"{owner}: follows_crack is not possible on faces of second-order tetrahedra; take "
-                "first-order cells or second-order hexahedra, or a pressure on fixed faces"
-            )
         takes = pair.paired & ~_held(pair, continuum, supports)
         parts = pair.title, found[0], [pair], [takes]
         return cls(load.title, load.amplitude, load.value, *parts)
@@ -103,22 +101,35 @@ class CrackPressure:
         """The interface as it was paired at the start."""
         return self._pair[0]
 
+    @property
+    def takes(self) -> Bools:
+        """Slave nodes that take forces: those that may open, shape (n_nodes,)."""
+        return self._takes[0]
+
+    @property
+    def surface(self) -> FacetSurface:
+        """The slave surface by facets of the order of the bodies."""
+        pair = self.pair
+        if pair.hierarchy is None:
+            return pair.surface
+        # the facets of the crack are first-order triangles; these are theirs with midside nodes
+        whole, n = pair.whole_surface, pair.surface.n_nodes
+        number = np.array([n * n, n, 1])
+        wanted = np.sort(pair.surface.facets[:, :3], axis=1) @ number
+        has = np.isin(np.sort(whole.facets[:, :3], axis=1) @ number, wanted)
+        return whole if has.all() else replace(whole, facets=whole.facets[has])
+
     def _facet_forces(self) -> Array:
         """Forces at amplitude 1 on the slave nodes of each facet, (n_facets, n_nodes, gdim)."""
         if not self._shares:
-            surface, gdim = self.pair.surface, self.pair.frames.shape[1]
+            surface, gdim = self.surface, self.pair.frames.shape[1]
             cell = getattr(basix.CellType, surface.kind)
             points, weights = basix.make_quadrature(cell, 2 * surface.order + 2)
             xi = np.asarray(points)
             values, _ = shape_functions(surface.kind, surface.order, xi)
             normal, size = surface.facet_normals(xi)
             x = np.einsum("mk,fkc->fmc", values, surface.x[surface.facets])
-            if callable(self.value):
-                where = f"pressure '{self.title}'"
-                pressure = numbers_at(where, "value", self.value, x.reshape(-1, 3))
-                pressure = pressure.reshape(x.shape[:2])
-            else:
-                pressure = np.full(x.shape[:2], float(self.value))
+            pressure = self._values(x)
             breadth = surface.breadth[surface.facets] @ values.T
             each = weights * size * breadth * pressure
             out = -np.einsum("fm,mk,fmc->fkc", each, values, normal[..., :gdim])
@@ -126,8 +137,28 @@ class CrackPressure:
             self._shares.append(out)
         return self._shares[0]
 
+    def _values(self, x: Array) -> Array:
+        """The pressure at amplitude 1 at positions, shape (..., 3) to (...)."""
+        if not callable(self.value):
+            return np.full(x.shape[:-1], float(self.value))
+        where = f"pressure '{self.title}'"
+        return numbers_at(where, "value", self.value, x.reshape(-1, 3)).reshape(x.shape[:-1])
+
+    def values_at(self, xi: Array) -> Array:
+        """The pressure at amplitude 1 at reference points of every facet.
+
+        Args:
+            xi: Shape (m, dim).
+
+        Returns:
+            Shape (n_facets, m), force/length^2.
+        """
+        surface = self.surface
+        shape, _ = shape_functions(surface.kind, surface.order, xi)
+        return self._values(np.einsum("mk,fkc->fmc", shape, surface.x[surface.facets]))
+
     def _at_nodes(self, chosen: Bools | None = None) -> Array:
-        surface = self.pair.surface
+        surface = self.surface
         forces, facets = self._facet_forces(), surface.facets
         if chosen is not None:
             forces, facets = forces[chosen], facets[chosen]
@@ -144,11 +175,21 @@ class CrackPressure:
         Returns:
             Shape (n_nodes, gdim), force.
         """
-        return self._at_nodes(bonded[self.pair.surface.facets].all(axis=1))
+        return self.on_jumps(self._at_nodes(bonded[self.surface.facets].all(axis=1)))
+
+    def on_jumps(self, forces: Array) -> Array:
+        """Forces on the jumps of the slave nodes by those on the nodes, (n_nodes, gdim) both.
+
+        The force of a midside node of second-order tetrahedra acts on the jumps of its corners.
+        """
+        hierarchy, out = self.pair.hierarchy, forces.copy()
+        if hierarchy is not None:
+            np.add.at(out, hierarchy.ends, 0.5 * forces[hierarchy.midsides][:, None, :])
+        return out
 
     def vector(self, continuum: Continuum) -> PETSc.Vec:
         """Nodal forces at amplitude 1 on both faces; collective; the caller destroys the vector."""
-        pair, layout = self.pair, continuum.layout
+        pair, layout = self.pair.by_nodes(), continuum.layout
         forces = self._at_nodes()
         vector = PETSc.Vec().createMPI((layout.n_local, layout.n_global), comm=continuum.comm)
         on_masters = -pair.forces_on_masters(forces)

@@ -94,6 +94,34 @@ class Hierarchy:
         out[self.midsides] = corners[self.ends].any(axis=1)
         return out
 
+    def on_whole_jumps(self, weights: Array) -> Array:
+        """Weights of whole jumps, turned to weights of the coordinates; shape (n_nodes,) both."""
+        out = weights.copy()
+        np.add.at(out, self.ends, 0.5 * weights[self.midsides, None])
+        return out
+
+    def curved(self, surface: FacetSurface) -> FacetSurface:
+        """The second-order triangles of which the surface has the corners.
+
+        Triangles with an edge whose midside node is not among the jumps are left out.
+
+        Args:
+            surface: First-order triangles on the corners.
+        """
+        middle = {
+            (min(e), max(e)): m for e, m in zip(self.ends.tolist(), self.midsides, strict=True)
+        }
+        rows, kept = [], []
+        for k, corner in enumerate(surface.facets.tolist()):
+            edges = [(corner[a], corner[b]) for a, b in MIDSIDES.values()]
+            found = [middle.get((min(e), max(e))) for e in edges]
+            if None not in found:
+                rows.append([*corner, *found])
+                kept.append(k)
+        facets = np.array(rows, dtype=np.int64).reshape(-1, 6)
+        outward = None if surface.outward is None else surface.outward[kept]
+        return replace(surface, order=2, facets=facets, inner=surface.inner[kept], outward=outward)
+
     def spread(self, values: Array) -> Array:
         """Values at corners, averaged onto the midside nodes; shape (n_nodes, ...) both."""
         out = values.copy()

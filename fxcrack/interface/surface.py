@@ -387,3 +387,12 @@ def _check_facets(surface: FacetSurface) -> None:
             f"facet group '{surface.name}' has {len(flat)} facets without length or area, the "
             f"first at {where}; merge their nodes or mesh the surface again"
         )
+
+
+def triangle_areas(x: Array) -> Array:
+    """Areas of plane triangles [length^2].
+
+    Args:
+        x: Their corners, shape (n, 3, 3) [length].
+    """
+    return 0.5 * np.linalg.norm(np.cross(x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]), axis=1)

@@ -17,6 +17,7 @@ from fxcrack.equilibrium.cohesive_bonds import CohesiveCounts
 from fxcrack.equilibrium.cohesive_law import CohesiveUnit
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
+from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.interface.front import Front
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
@@ -141,6 +142,7 @@ class Solver(AnySolver, Protocol):
         prepared: Whether :meth:`prepare` has been called.
         system: The dense system on the retained jumps.
         state: Set by the caller that moves along a piece of the load path.
+        fluids: Pressures that follow the crack of bodies of finite strain.
         face_loads: Force of every force pattern on the retained jumps, shape (n_retained,
             n_forces).
         rebases: Sets of retained jumps chosen since the step began.
@@ -153,6 +155,7 @@ class Solver(AnySolver, Protocol):
     prepared: bool
     system: ContactSystem
     face_loads: Array
+    fluids: list[CrackFluid]
     rebases: int
     friction_energy: float
     overlap_energy: float

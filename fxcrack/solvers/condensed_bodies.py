@@ -15,6 +15,7 @@ from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.continuum.thermal_strain import ThermalLoad
 from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.solvers.base import Solver
 from fxcrack.solvers.cell_source import CellSource
 
@@ -52,7 +53,7 @@ class CondensedBodies:
             return "inertia"
         if forms.path_dependent:
             return "plasticity"
-        if any(isinstance(term, FollowerPressure) for term in forms.terms):
+        if any(isinstance(term, FollowerPressure | CrackFluid) for term in forms.terms):
             return "pressures that follow the bodies"
         return ""
 

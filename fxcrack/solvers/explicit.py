@@ -248,6 +248,14 @@ class ExplicitSolver:
         self.stable = self.stability.again(self.velocity)
         return self.stable
 
+    def damping_changed(self, *, fallen: bool) -> bool:
+        """Whether quadratic bulk viscosity damps otherwise than at the last look; collective.
+
+        Args:
+            fallen: Whether less damping is looked for as well as more.
+        """
+        return self.stability.damping_changed(self.velocity, self.dt, fallen=fallen)
+
     def set_displacement(self, owned: Array) -> None:
         """Begin with a displacement of the owned dofs, shape (n_local,), length; collective."""
         x = self.bodies.u.x

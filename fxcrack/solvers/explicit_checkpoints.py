@@ -48,15 +48,19 @@ class MotionCheckpoints:
         Returns:
             displacement, velocity and positions of all nodes in the order of the input, on rank 0;
             bonds and energies of the interfaces by row; bonded[p], shape (n_nodes,), and jump[p],
-            shape (n_nodes, gdim), per pair; loads, shape (n_loads,). At finite strain also pairs
-            and gaps that have changed, and the last look at the stable increment.
+            shape (n_nodes, gdim), per pair; loads, shape (n_loads,). Where the stable increment
+            changes also the last look at it, and at finite strain pairs and gaps that have changed.
         """
         files = self._files
         out = files.arrays(saved) | {"loads": state.loads}
+        look = self._stability
+        if look.changes:
+            out["stable"] = np.array([stable, look.compressed])
+            out["highest"] = files.gather(look.highest)
+            out["most_damped"] = files.gather(look.most_damped)
         if self._finite:
-            out |= self._moving.arrays() | {"stable": np.array([stable])}
-            out["highest"] = files.gather(self._stability.highest)
-            out["looked"] = files.gather(self._stability.looked)
+            out |= self._moving.arrays()
+            out["looked"] = files.gather(look.looked)
         return out | self._present.arrays(self._fronts, state.jump)
 
     def resumed(self, arrays: Arrays) -> MotionSnapshot:
@@ -78,12 +82,13 @@ class MotionCheckpoints:
             if gone.any():
                 front.release(np.flatnonzero(gone))
         if "highest" in arrays:
-            self._moving.restore(arrays)
-            self._stability.restore(
-                files.scatter(arrays["highest"]),
-                float(arrays["stable"][0]),
-                files.scatter(arrays["looked"]),
-            )
+            looked = np.zeros(0)
+            if self._finite:
+                self._moving.restore(arrays)
+                looked = files.scatter(arrays["looked"])
+            highest, damped = (files.scatter(arrays[k]) for k in ("highest", "most_damped"))
+            stable, compressed = arrays["stable"].astype(float).tolist()
+            self._stability.restore(highest, stable, looked, damped, compressed)
         return files.snapshot(arrays)
 
 

@@ -26,6 +26,7 @@ from fxcrack.solvers.explicit_faces import (
     total_forces,
     without_gain,
 )
+from fxcrack.solvers.explicit_separate import SeparateRows
 from fxcrack.solvers.explicit_softening import LiveBonds
 
 
@@ -99,6 +100,7 @@ class OpenPairs:
             self._normal, lumped.gap[rows] if self._has_gap else None, self._may_touch,
             self._friction[rows], lumped.compliance, lumped.reach, lumped.response, lumped.separate,
         )  # fmt: skip
+        self._separate = SeparateRows.of(self._faces)
         self._last_found: FaceForces | None = None
 
     def overlap(self, x: Array) -> bool:
@@ -155,9 +157,13 @@ class OpenPairs:
     ) -> Array | None:
         """Softening forces, exact contact and friction, (n_open, gdim); ``None``: there is none."""
         faces = self._faces
-        found = find_forces(
-            faces, live, soft, motion.gap, motion.free, motion.hh, self._last_found
-        )  # fmt: skip
+        if self._separate is not None:
+            rows = replace(self._separate, faces=faces)
+            found = rows.forces(live, soft, motion.gap, motion.free, motion.hh)
+        else:
+            found = find_forces(
+                faces, live, soft, motion.gap, motion.free, motion.hh, self._last_found
+            )  # fmt: skip
         if not faces.separate:
             self._last_found = found
         if not len(soft) and not len(found.touch):

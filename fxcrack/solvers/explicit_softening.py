@@ -55,6 +55,11 @@ class LiveBonds:
         self._last = np.zeros(len(k))
         self._buffers = [np.zeros(len(k)) for _ in range(3)]
 
+    @property
+    def largest(self) -> Array:
+        """Largest forces of the laws, shape (n,), force."""
+        return self._strength
+
     def __len__(self) -> int:
         """How many bonds soften."""
         return len(self.rows)

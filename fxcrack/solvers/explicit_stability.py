@@ -25,6 +25,8 @@ from fxcrack.solvers.stable_increment import (
     start_vector,
 )
 
+_DAMPED = 0.01
+"""Change of the damping by quadratic bulk viscosity, over critical, that is looked at."""
 _AGAIN = 6
 """Lanczos steps that follow a tangent which has changed little."""
 
@@ -40,6 +42,7 @@ class Stability:
 
     Attributes:
         looked: Displacement at the last look, owned dofs, shape (n_local,), length.
+        compressed: Damping over critical by quadratic bulk viscosity at the last look, about.
     """
 
     def __init__(
@@ -49,7 +52,8 @@ class Stability:
         self._bodies, self._dynamics, self._further = bodies, dynamics, further
         self._at_interface = at_interface
         self.looked = np.zeros(0)
-        self._known: tuple[Array, float] | None = None
+        self.compressed = 0.0
+        self._known: tuple[Array, float, Array] | None = None
         self._edges: tuple[Ints, Ints, Array] | None = None
         self._edges_then = np.zeros(0)
 
@@ -97,6 +101,7 @@ class Stability:
         known, self._known = self._known, None
         if known is not None:
             self._highest = HighestFrequency(continuum.comm, mass, known[0])
+            self._damping = HighestFrequency(continuum.comm, mass, known[2])
             return known[1]
         self._highest = HighestFrequency(continuum.comm, mass, start)
         return self._by(STEPS, velocity)
@@ -106,25 +111,36 @@ class Stability:
         """The vector that the highest mode is seen in, owned dofs, shape (n_local,)."""
         return self._highest.vector
 
+    @property
+    def most_damped(self) -> Array:
+        """The vector that the most damped mode is seen in, owned dofs, shape (n_local,)."""
+        return self._damping.vector
+
     def again(self, velocity: Array) -> float:
         """The same with the present tangent and velocity, by a few more steps; collective."""
         return self._by(_AGAIN, velocity)
 
-    def restore(self, highest: Array, stable: float, looked: Array) -> None:
+    def restore(
+        self, highest: Array, stable: float, looked: Array, damped: Array, compressed: float
+    ) -> None:
         """Take a look before a checkpoint, which the next :meth:`find` gives again; collective.
 
         Args:
             highest: As :attr:`highest`.
             stable: What it found, time.
             looked: As :attr:`looked`.
+            damped: As :attr:`most_damped`.
+            compressed: As :attr:`compressed`.
         """
+        self._known, self.compressed = (highest, stable, damped), compressed
+        if not self._bodies.finite:
+            return
         x = self._bodies.u.x
         now = x.array.copy()
         x.array[: len(looked)] = looked
         x.scatter_forward()
         self._look()
         x.array[:] = now
-        self._known = highest, stable
 
     def _look(self) -> None:
         self.looked = self._bodies.u.x.array[: self._bodies.continuum.n_local].copy()
@@ -138,6 +154,33 @@ class Stability:
         change = self._edges_now() - self._edges_then
         largest = float(np.sqrt((change**2).sum(axis=1).max(initial=0.0)))
         return float(self._bodies.continuum.comm.allreduce(largest, op=MPI.MAX))
+
+    def damping_changed(self, velocity: Array, dt: float, *, fallen: bool) -> bool:
+        """Whether quadratic bulk viscosity damps otherwise than at the last look; collective.
+
+        Cells that are compressed at the rate e are damped as by a linear viscosity of b2^2 e L/c,
+        with L/c about the increment. Of bodies that move slowly the range of the velocity shows
+        that e is small.
+
+        Args:
+            velocity: Of the owned dofs, shape (n_local,).
+            dt: The increment.
+            fallen: Whether less damping is looked for as well as more.
+        """
+        viscosity, continuum = self._further.viscosity, self._bodies.continuum
+        assert viscosity is not None
+        factor = viscosity.quadratic**2 * dt
+        by_node = continuum.layout.by_node(velocity)[:, : continuum.gdim]
+        ends = np.concatenate(
+            [by_node.max(axis=0, initial=-np.inf), -by_node.min(axis=0, initial=np.inf)]
+        )
+        continuum.comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
+        width = float(np.linalg.norm(ends[: continuum.gdim] + ends[continuum.gdim :]))
+        most = factor * width * viscosity.rate_of_range
+        if most <= self.compressed + _DAMPED and not fallen:
+            return False
+        now = factor * viscosity.compression(velocity)
+        return now > self.compressed + _DAMPED or (fallen and now < self.compressed - _DAMPED)
 
     def _edges_now(self) -> Array:
         """Differences of the displacement along the edges over their lengths, (n_edges, gdim)."""
@@ -160,6 +203,9 @@ class Stability:
         if viscosity is not None:
             viscosity.forces(velocity)
             rate = self._damping(viscosity.product, steps) ** 2
+            if viscosity.changes:
+                factor = viscosity.quadratic**2 * 2.0 / omega
+                self.compressed = factor * viscosity.compression(velocity)
         return rounded_down(damped_increment(omega, rate))
 
     def _tangent_product(self, direction: Array) -> Array:

@@ -72,6 +72,15 @@ class CondensedFrontProbe:
                 each = np.zeros((self.front.surface.n_nodes, 3))
                 each[:, : self.gdim] = load.under_bonds(self.front.bonded)
                 total = total + float(state.loads[first + k]) * each[nodes]
+        return total + self._turned(nodes, self.front.bonded)
+
+    def _turned(self, nodes: Ints, bonded: Bools | None = None) -> Array | float:
+        """What finite strain has changed of the loads of such pressures on faces, (..., 3)."""
+        total: Array | float = 0.0
+        for fluid in self._solver.fluids:
+            if fluid.pressure.p == self._p:
+                more = fluid.more_on_faces(bonded)
+                total = total + np.pad(more, ((0, 0), (0, 3 - self.gdim)))[nodes]
         return total
 
     def round_off(self, nodes: Ints, state: Equilibrium) -> Array:
@@ -107,7 +116,7 @@ class CondensedFrontProbe:
         solver = self._solver
         factors = state.loads[solver.n_loads - len(solver.loads) :]
         every = solver.vectors(self._p, nodes, solver.face_loads @ factors)
-        return every - self._under_bonds(nodes, state)
+        return every + self._turned(nodes) - self._under_bonds(nodes, state)
 
     def released_jumps(self, nodes: Ints, force: Array, normal: Array | None = None) -> Array:
         """Jumps that releasing some nodes would open, global vectors of shape (k, 3) [length]."""

@@ -29,6 +29,7 @@ from fxcrack.equilibrium.cohesive_law import CohesiveBond, CohesiveUnit
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.friction_state import release_to_contact
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState, allow_contact
+from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import FIXED, JumpCoordinates, global_vectors
 from fxcrack.interface.pair import Pair
@@ -76,6 +77,7 @@ class InterfaceSolver(ABC):
         held_by_supports: Jumps that supports hold at zero per pair, shape (n_nodes, gdim).
         face_loads: Force of every force pattern on the retained jumps, shape (n_retained,
             n_forces).
+        fluids: Pressures that follow the crack of bodies of finite strain.
         active: Whether the crack may grow, per pair.
         around: Distances ahead of and behind the tips that the criterion needs, per pair, length.
         rebases: Sets of retained jumps chosen since the step began.
@@ -118,6 +120,7 @@ class InterfaceSolver(ABC):
         self.frames = [p.frames for p in pairs]
         self.held_by_supports = [i >= 0 for i in self.index]
         self.face_loads = np.zeros((0, len(loads)))
+        self.fluids: list[CrackFluid] = []
         self.system = ContactSystem(np.zeros((n, n)), 0, n, len(loads))
         self.state = Equilibrium(np.zeros(n), np.zeros(0), np.zeros(0), np.zeros(n))
         self._reach = [np.inf] * len(pairs)

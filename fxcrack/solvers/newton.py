@@ -19,6 +19,7 @@ from fxcrack.continuum.weak_form import WeakForm
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
+from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.condensed_tangent import CondensedRequest, condense_tangent
@@ -98,6 +99,7 @@ class NewtonSolver(InterfaceSolver):
             )
         self.bodies = bodies
         self.newton = newton
+        self.fluids = [t for t in bodies.terms if isinstance(t, CrackFluid)]
         self.tangent = CondensedTangent(
             bodies, supports, loads, monitors, method=options.method, timings=self.timings
         )

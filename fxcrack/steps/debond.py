@@ -113,10 +113,11 @@ class Debond:
         if not self.interface.is_rigid:
             return
         for criterion in (self.criterion, *self.watch):
-            if criterion.needs_free_faces:
+            if criterion.needs_free_faces and not self.interface.symmetry:
                 raise InputError(
                     f"{where}: method='domain' integrates over the bodies on both sides, and one "
-                    "side is a rigid surface; use method='vcct' or method='closure'"
+                    "side is a rigid surface; use method='vcct' or method='closure', or say "
+                    "symmetry=True if it is a plane of symmetry"
                 )
             if getattr(criterion, "mode_length", None) is not None:
                 raise InputError(

@@ -13,6 +13,9 @@ from fxcrack.steps.end_conditions import Time, Until, conditions
 OPERATORS = ("auto", "product", "assembly")
 CONTACTS = ("exact", "penalty")
 
+MOST_BULK = (1.0, 10.0)
+"""Largest linear and quadratic bulk viscosity."""
+
 
 @dataclass(frozen=True)
 class Explicit:
@@ -43,8 +46,9 @@ class Explicit:
         operator: How internal forces of linear bodies are found: "product" with the stiffness,
             "assembly", or "auto": the faster one, which is timed. Nonlinear bodies assemble.
         bulk: Bulk viscosity, linear and quadratic, of bodies of small strain: the fraction of
-            critical damping of the highest mode of volume change, and the width of shocks in
-            cells, about; (0.06, 1.2) is usual in impact. It shortens the increment and dissipates
+            critical damping of the highest mode of volume change, at most 1, and the width of
+            shocks in cells, about, at most 10; (0.06, 1.2) is usual in impact. It shortens the
+            increment, which follows the quadratic part where ``dt`` is not given, and dissipates
             ``viscous_energy``; exact bonds and progressive release need none.
         tolerance: Part of all energies by which their balance may be off before the run stops, for
             linear bodies; a thousand times as much for nonlinear ones.
@@ -90,6 +94,15 @@ class Explicit:
             )
         not_negative("Explicit", **{f"bulk[{i}]": b for i, b in enumerate(bulk)})
         keep(self, bulk=(float(bulk[0]), float(bulk[1])))
+        for name, value, most, usual in zip(
+            ("linear", "quadratic"), self.bulk, MOST_BULK, (0.06, 1.2), strict=True
+        ):
+            if value > most:
+                raise InputError(
+                    f"Explicit: {name} bulk viscosity of {value:g} is above {most:g}, which damps "
+                    "waves of volume change beyond critical and shortens the increments without "
+                    f"need; {usual:g} is usual"
+                )
         if self.penalty > 1.0:
             raise InputError(
                 f"Explicit: penalty = {self.penalty} is above 1, the stiffness at which faces that "

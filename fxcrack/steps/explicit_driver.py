@@ -30,6 +30,8 @@ CHECK = 100
 """Increments between looks at signals and checkpoints."""
 _NONE = 1e-9
 """Part of a row that is none."""
+_SHORT = 3.0
+"""Shortening of the increments by bulk viscosity that is told."""
 _NONLINEAR = 1e3
 """By how much the energies of nonlinear bodies may be off more than those of linear ones."""
 _OVERLAP = 1e-2
@@ -71,8 +73,9 @@ class ExplicitDriver:
                 speed.passed = [(float(t), float(a)) for t, a in passed]
         self._follows = solver.bodies.finite
         changes = solver.stability.changes
-        self._adapts = changes and solver.bodies.finite and step.dt is None
+        self._adapts = changes and step.dt is None
         self._may_become_unstable = changes and not self._adapts
+        self._told = False
         self._good: tuple[Any, list[int], int] | None = None
         self._may_overlap = np.zeros(solver.lumped.n_rows, dtype=bool)
         for pair, rows in zip(solver.pairs, solver.row_of, strict=True):
@@ -99,7 +102,7 @@ class ExplicitDriver:
         resumed = self._resume is not None
         while True:
             n = self._n
-            if self._adapts and not resumed and n % LOOK == 0:
+            if self._adapts and not resumed:
                 self._adapt(n)
             analysis.time = increments.time(n)
             then = analysis.loads_at(increments.time(n + 1))
@@ -126,13 +129,36 @@ class ExplicitDriver:
             analysis.balance.increment += 1
 
     def _adapt(self, n: int) -> None:
-        """Let the increments from number n on follow what is stable now; collective."""
-        solver = self.solver
-        if solver.stability.strained() < STRAINED:
+        """Let the increments from number n on follow what is stable now; collective.
+
+        Bodies strain little in LOOK increments; a shock comes within one.
+        """
+        solver, increments, regular = self.solver, self._increments, n % LOOK == 0
+        if solver.bodies.finite:
+            changed = regular and solver.stability.strained() >= STRAINED
+        else:
+            changed = solver.damping_changed(fallen=regular)
+        if changed:
+            increments.adapt(n, solver.renew_stable_increment(), self.step.safety)
+        elif regular and increments.may_grow and not solver.bodies.finite:
+            increments.adapt(n, solver.stable, self.step.safety)
+        solver.dt = increments.dt
+        self._tell_of_short_increments()
+
+    def _tell_of_short_increments(self) -> None:
+        """Say once where bulk viscosity has made increments much shorter."""
+        increments = self._increments
+        if self._told or self.solver.bodies.finite or increments.shortened < _SHORT:
             return
-        stable = solver.renew_stable_increment()
-        self._increments.adapt(n, stable, self.step.safety)
-        solver.dt = self._increments.dt
+        self._told = True
+        log.warn(
+            "bulk viscosity has shortened the increments of explicit dynamics by a factor of %.2g "
+            "at time %g, where bodies are compressed at a rate that small strain is not meant "
+            "for; take a smaller quadratic part, Explicit(bulk=(%g, ...))",
+            increments.shortened,
+            self.solver.at,
+            self.step.bulk[0],
+        )
 
     def _release(self) -> bool:
         """Release nodes until none is critical; whether any was."""
@@ -187,8 +213,8 @@ class ExplicitDriver:
             if stable < self.solver.dt:
                 return self._stopped(
                     f"motion has lowered the stable increment to {stable:g}, below dt = "
-                    f"{self.solver.dt:g}; take Explicit(safety="
-                    f"{0.9 * self.step.safety * stable / self.solver.dt:.2g})"
+                    f"{self.solver.dt:g}; take Explicit(dt={0.9 * stable:.2g}), or leave dt out "
+                    "for increments that follow the stable one"
                 )
         analysis.history.append(row)
         if self._observer is not None:

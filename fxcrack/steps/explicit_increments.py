@@ -49,6 +49,7 @@ class Increments:
 
     Attributes:
         piece: The present even increments.
+        may_grow: Whether longer ones were stable at the last look, one grade at a time.
     """
 
     def __init__(self, start: float, end: float, dt: float, stable: float) -> None:
@@ -56,6 +57,7 @@ class Increments:
         self.piece = self._even(0, start, dt)
         self._grade, self._longest = 0, dt
         self._stable = stable
+        self.may_grow = False
 
     def _even(self, first: int, at: float, dt: float) -> Piece:
         left = self._end - at
@@ -66,6 +68,11 @@ class Increments:
     def dt(self) -> float:
         """Length of the present increments."""
         return self.piece.dt
+
+    @property
+    def shortened(self) -> float:
+        """The longest increment over the present one."""
+        return self._longest / self.piece.dt
 
     def time(self, n: int) -> float:
         """Time at which increment n begins; n from the present piece on."""
@@ -98,6 +105,7 @@ class Increments:
             grade = needed
         elif needed < grade - 1:
             grade -= 1
+        self.may_grow = needed < grade - 1
         if grade != self._grade and not self.is_end(n):
             self._grade = grade
             self.piece = self._even(n, self.time(n), self._longest * _GRADE**grade)
@@ -108,6 +116,7 @@ class Increments:
             "grade": self._grade,
             "longest": self._longest,
             "stable": self._stable,
+            "may_grow": self.may_grow,
         }
 
     def restore(self, state: Mapping[str, Any]) -> None:
@@ -117,6 +126,7 @@ class Increments:
         )
         self._grade, self._longest = int(state["grade"]), float(state["longest"])
         self._stable = float(state["stable"])
+        self.may_grow = bool(state.get("may_grow", False))
 
 
 __all__ = ["Increments", "Piece"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from fxcrack.base.errors import InputError
@@ -10,10 +11,12 @@ from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear, thermal_loads
+from fxcrack.interface.definition import Interface
 from fxcrack.interface.supported_slaves import tell_of_held_bonds
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.solvers.plan import Plan
 from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_rules import (
     check_bodies,
@@ -87,6 +90,23 @@ def prepare_explicit(
     analysis.started = True
 
 
+def paired_by_nodes(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> dict[str, Any]:
+    """Interfaces at rest that pair their nodes as explicit dynamics does, by argument of a scene.
+
+    Args:
+        debonds: Interfaces with a criterion.
+        bonds: Those without.
+    """
+
+    def by_nodes(interface: Interface) -> Interface:
+        return interface if interface.is_rigid else replace(interface, pairing="node-to-surface")
+
+    return {
+        "debonds": [replace(d, interface=by_nodes(d.interface)) for d in debonds],
+        "bonds": [by_nodes(b) for b in bonds],
+    }
+
+
 def start_from(analysis: Analysis, still: Analysis) -> None:
     """Begin explicit dynamics in a static equilibrium; collective.
 
@@ -101,4 +121,4 @@ def start_from(analysis: Analysis, still: Analysis) -> None:
     vector.destroy()
 
 
-__all__ = ["prepare_explicit", "start_from", "use_explicit_solver"]
+__all__ = ["paired_by_nodes", "prepare_explicit", "start_from", "use_explicit_solver"]

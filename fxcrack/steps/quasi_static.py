@@ -352,7 +352,13 @@ class OpeningControl:
     def excess(self, state: Equilibrium) -> float:
         """What the opening of a state has over that of the last onset, length."""
         values = self._solver.system.monitors(state)[: len(self._weight)]
-        return float(self._weight @ values + self._volume @ state.conjugate) - self.opening
+        first = self._solver.n_loads - len(self._solver.loads)
+        more = 0.0
+        titles = [load.title for load in self._solver.loads]
+        for fluid in self._solver.fluids:
+            k = titles.index(fluid.pressure.title)
+            more += float(self._volume[first + k]) * fluid.more_volume()
+        return float(self._weight @ values + self._volume @ state.conjugate) + more - self.opening
 
     def reach(self, state: Equilibrium) -> None:
         """Control the opening of a state from now on.

@@ -85,6 +85,9 @@ def history_row(analysis: Analysis, event: str) -> Row:
     for monitor, value in zip(solver.monitors, monitored, strict=False):
         if not is_shared(monitor):
             row[f"m[{monitor.title}]"] = float(value)
+    for fluid in solver.fluids:  # the volume between faces that have turned
+        volume = f"v[{fluid.pressure.title}]"
+        row[volume] = float(row[volume]) + fluid.more_volume()
     row |= columns_of_shared(solver, state.loads, state.conjugate, monitored)
     for g, v in analysis.at_tips():
         row[f"a[{g.title}]"] = g.extent.length(v.tips)

@@ -14,6 +14,8 @@ import numpy as np
 
 from fxcrack.base import log
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.materials import Isotropic, Orthotropic
+from fxcrack.continuum.temperature_field import entries
 from fxcrack.steps.crack import Crack
 
 _TOO_SMALL = 1e-10
@@ -25,16 +27,13 @@ def warn_of_units(cracks: Sequence[Crack], continuum: Continuum, said: set[str])
 
     Args:
         cracks: The cracks that may grow.
-        continuum: The bodies.
+        continuum: The bodies; solids of isotropic and orthotropic materials are looked at.
         said: What was warned of before; "units" is added.
     """
-    # of shells and continuum shells the mean of their plies
-    bodies = [getattr(m, "laminate", m) for m in continuum.part_materials]
-    moduli = [
-        float(np.diag(np.asarray(m.stiffness())).max())
-        for m in bodies
-        if hasattr(m, "stiffness") and np.ndim(m.stiffness()) == 2
-    ]
+    every = [m for part in continuum.part_materials for m in entries(part)]
+    # other materials have no stiffness of their own, or one of another meaning
+    elastic = [m for m in every if isinstance(m, Isotropic | Orthotropic)]
+    moduli = [float(np.diag(m.stiffness()).max()) for m in elastic]
     if "units" in said or not moduli:
         return
     for g in cracks:
