@@ -63,8 +63,11 @@ def read_transforms(cards: Sequence[Card], flat: Flat) -> Transforms:
         DeckError: A card is not complete.
     """
     n = len(flat.points)
-    frames, owner = np.tile(np.eye(3), (n, 1, 1)), np.full(n, -1, dtype=np.int64)
+    owner = np.full(n, -1, dtype=np.int64)
     found = [card for card in cards if card.keyword == "TRANSFORM"]
+    if not found:  # one frame stands for those of all nodes
+        return Transforms(np.broadcast_to(np.eye(3), (n, 3, 3)), owner >= 0, owner, found)
+    frames = np.tile(np.eye(3), (n, 1, 1))
     for number, card in enumerate(found):
         nodes = flat.with_centres(flat.nodes(card, card.text("NSET")))
         frames[nodes] = _frames(card, card.need_rows("two points")[0], nodes, flat)

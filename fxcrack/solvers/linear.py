@@ -352,8 +352,13 @@ class LinearSolver(InterfaceSolver):
 
     @property
     def responds(self) -> bool:
-        """Whether :meth:`response` takes back-substitutions and no new factorisation."""
-        return isinstance(self.condensation, DirectCondensation) and self.condensation.recovers
+        """Whether :meth:`response` takes back-substitutions and no new factorisation.
+
+        With friction there is none: what slips answers further forces by its direction.
+        """
+        condensation = self.condensation
+        direct = isinstance(condensation, DirectCondensation) and condensation.recovers
+        return direct and self.system.friction is None
 
     def response(self, forces: Array) -> Array:
         """Displacement by further forces, supports, loads, bonds and contact as they are.
