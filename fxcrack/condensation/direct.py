@@ -108,7 +108,7 @@ class DirectCondensation:
         start = time.perf_counter()
         if not self._has_inner:
             self.schur = self._all_last()
-        elif self._by_schur:
+        elif self._by_schur and self.coordinates.n_last:
             try:
                 self._factorise(gdim)
             except SolverError as error:

@@ -169,6 +169,7 @@ class ConservingForces(Term):
         self._mean = 1.0 / (1.0 - self._old)
         self._begin = fem.Function(continuum.space)
         size = len(self._begin.x.array)
+        self._begun = False  # whether an equilibrium has been found before the motion
         self._moves = False  # whether an increment of time has begun
         self._force = np.zeros(size)  # f of the last commit, owned dofs
         self._lack = np.zeros(size)  # e there
@@ -241,6 +242,7 @@ class ConservingForces(Term):
         """Begin the motion at a displacement that loads at rest have brought about."""
         if not self._moves:
             self._settle_at(u.x.array)
+            self._begun, self._thermal = True, self._stored
 
     def begin(self, time: float, dt: float) -> None:
         """Set what the increment knows of its beginning; collective."""
@@ -286,13 +288,13 @@ class ConservingForces(Term):
 
         Returns:
             "u" (length) and "lack" (force): local dofs, ghosts too, shape (n_dofs,); "loss": energy
-            dissipated by the method, 1 once the bodies have moved, work of the temperature, and
-            time, shape (4,).
+            dissipated by the method, 1 once the bodies have moved, work of the temperature, time,
+            and 1 where they began in an equilibrium, shape (5,).
         """
         return {
             "u": self._begin.x.array.copy(),
             "lack": self._lack.copy(),
-            "loss": np.array([self._loss, float(self._moves), self._thermal, self._at]),
+            "loss": np.array([self._loss, self._moves, self._thermal, self._at, self._begun]),
         }
 
     def places(self) -> dict[str, Place]:
@@ -304,8 +306,13 @@ class ConservingForces(Term):
         self._loss, moves, *more = (float(x) for x in state["loss"])
         self._moves = bool(moves)
         if self._rise is not None:
-            self._thermal, self._at = more
-            self._set_time(self._at)
+            self._thermal, self._at, begun = more
+            self._begun = bool(begun)
+            if self._moves or self._begun:
+                self._set_time(self._at)
+            else:
+                assert self._continuum.temperature is not None
+                self._continuum.temperature.clear()
         self._lack = state["lack"].copy()
         self._settle_at(state["u"])
 

@@ -156,6 +156,10 @@ class Plasticity(Term):
             self._soft.x.array[dofs] = soft
             self._softer.x.array[dofs] = softer
 
+    def begin_at(self, u: fem.Function) -> None:
+        """Keep what the temperature has done at rest before the bodies move; collective."""
+        self.commit(u)
+
     def commit(self, u: fem.Function) -> None:
         """Keep plastic strain and stress, add the plastic work; collective."""
         self._plastic_work += self.path_spent(u)

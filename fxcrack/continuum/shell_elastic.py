@@ -77,6 +77,10 @@ class ShellElastic(Term):
         if self._thermal is not None:
             self._thermal.begin(time)
 
+    def begin_at(self, u: fem.Function) -> None:
+        """Add the work of the temperature that shells have at rest before they move."""
+        self.commit(u)
+
     def commit(self, u: fem.Function) -> None:
         """Add the work of the temperature."""
         if self._thermal is not None:

@@ -87,6 +87,12 @@ class TemperatureField:
             self.rise.x.array[:] += factor * pattern.x.array
         self.version += 1
 
+    def clear(self) -> None:
+        """Take the temperature at which bodies are free of thermal strain, until a time is set."""
+        self.factors = np.zeros(len(self.patterns))
+        self.rise.x.array[:] = 0.0
+        self.version += 1
+
     def nodal_patterns(self, space: fem.FunctionSpace) -> Array:
         """Patterns at the local nodes of a (vector) Lagrange space, shape (n_patterns, n)."""
         out = []

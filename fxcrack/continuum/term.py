@@ -157,6 +157,10 @@ class StoringTerm(Term):
             self._thermal.begin(time)
             self.version = self._thermal.version
 
+    def begin_at(self, u: fem.Function) -> None:
+        """Add the work of the temperature that bodies have at rest before they move."""
+        self.commit(u)
+
     def commit(self, u: fem.Function) -> None:
         """Add the work of the temperature."""
         if self._thermal is not None:

@@ -9,10 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.base.arrays import Array, Bools
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
-from fxcrack.equilibrium.cohesive_bonds import CohesiveBonds
 from fxcrack.interface.finite_sliding import changing, names_changing, renewed, with_changing
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import JumpCoordinates
@@ -20,7 +19,6 @@ from fxcrack.interface.nodes import JumpGather
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.rigid import RigidSurface
 from fxcrack.interface.surface import FacetSurface, gather_surface
-from fxcrack.solvers.increment_work import IncrementWork
 
 
 class DeformedInterfaces:
@@ -139,90 +137,4 @@ def _master_of(continuum: Continuum, pair: Pair) -> FacetSurface | RigidSurface:
     return master
 
 
-def pulling(index: list[Ints], force: Array, soft: CohesiveBonds) -> list[Bools]:
-    """Nodes per pair whose bonds are released but still carry a force, shape (n_nodes,).
-
-    Args:
-        index: Number of each retained jump per pair, shape (n_nodes, gdim), -1 where there is none.
-        force: Given forces, shape (n_retained,), force.
-        soft: Softening bonds.
-    """
-    carried = np.append(force != 0.0, False)
-    out = [carried[numbers].any(axis=1) for numbers in index]
-    for bond in soft.bonds:
-        out[bond.where[0]][bond.where[1]] = True
-    return out
-
-
-def pressed(index: list[Ints], closed: Bools) -> list[Bools]:
-    """Nodes per pair that are in contact, shape (n_nodes,).
-
-    Args:
-        index: As for :func:`pulling`.
-        closed: Normal components in contact, shape (n_retained,).
-    """
-    touch = np.append(closed, False)
-    return [touch[numbers].any(axis=1) for numbers in index]
-
-
-class PairingEnergy:
-    """Energy taken by new pairings of faces that slide.
-
-    Contact forces move to other master points, and gaps that are not zero there close: on the way
-    to the next equilibrium the interfaces do work, of which friction and bonds explain a part. The
-    rest is this energy.
-
-    Attributes:
-        energy: What it is so far.
-    """
-
-    def __init__(self) -> None:
-        self.energy = 0.0
-        self._before: PETSc.Vec | None = None
-
-    @property
-    def pending(self) -> bool:
-        """Whether there is a new pairing whose equilibrium has not been accepted yet."""
-        return self._before is not None
-
-    def begin(self, forces: PETSc.Vec) -> None:
-        """Keep the forces of interfaces and supports before a new pairing, owned from now on."""
-        self.forget()
-        self._before = forces
-
-    def book(
-        self,
-        forces: PETSc.Vec,
-        middle: PETSc.Vec | None,
-        step: PETSc.Vec,
-        work: IncrementWork,
-        n_forces: int,
-    ) -> None:
-        """Add the energy of the pairing, by Simpson's rule or the trapezoidal one; collective.
-
-        Args:
-            forces: Forces of interfaces and supports after it; destroyed.
-            middle: Those in half of the displacement, which elastic bodies have at any speed;
-                destroyed. ``None`` for the trapezoidal rule.
-            step: Change of the displacement.
-            work: Work along the increment.
-            n_forces: Number of force patterns.
-        """
-        forces.axpy(1.0, self._before)
-        done = 0.5 * float(forces.dot(step))
-        if middle is not None:
-            done = (done + 2.0 * float(middle.dot(step))) / 3.0
-            middle.destroy()
-        given = done - work.support_work(n_forces)
-        self.energy -= given + work.bonds + work.friction + work.contact
-        forces.destroy()
-        self.forget()
-
-    def forget(self) -> None:
-        """Discard a pairing whose equilibrium has not been accepted."""
-        if self._before is not None:
-            self._before.destroy()
-            self._before = None
-
-
-__all__ = ["DeformedInterfaces", "PairingEnergy", "pressed", "pulling"]
+__all__ = ["DeformedInterfaces"]

@@ -23,11 +23,12 @@ from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.condensed_tangent import CondensedRequest, condense_tangent
-from fxcrack.solvers.deformed_interfaces import DeformedInterfaces, PairingEnergy, pressed, pulling
+from fxcrack.solvers.deformed_interfaces import DeformedInterfaces
 from fxcrack.solvers.free_motion import moves_freely
 from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
 from fxcrack.solvers.increment_work import in_pieces
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
+from fxcrack.solvers.new_pairings import PairingEnergy, pressed, pulling
 from fxcrack.solvers.newton_state import (
     NewtonState,
     ResumedTangent,
@@ -172,8 +173,8 @@ class NewtonSolver(InterfaceSolver):
         """Let bodies with inertia that nothing holds begin without an equilibrium; collective.
 
         Before an increment of time the tangent holds no inertia, so that it is singular where a
-        body can move freely. There is then no equilibrium to begin with, and loads that are there
-        from the first moment are applied within the first increment.
+        body can move freely. There is then no equilibrium to begin with, and loads and a
+        temperature that are there from the first moment are applied within the first increment.
 
         Args:
             dt: Length of the first increment, time.
@@ -191,6 +192,9 @@ class NewtonSolver(InterfaceSolver):
         self.state = Equilibrium(np.zeros(self.n_loads), zero, zero, np.zeros(self.n_loads))
         if not self.free_start:
             self._solve(zero)
+        elif self.continuum.temperature is not None:
+            self.continuum.temperature.clear()
+            self.bodies.set(self.u)
 
     def _solve(self, force: Array) -> None:
         """Find the equilibrium at the present loads with given forces, shape (n_retained,)."""
@@ -296,10 +300,10 @@ class NewtonSolver(InterfaceSolver):
         self.energy.accept(trial.energies)
         self.state = trial.end
         self._account.accept()
-        if self.pairing.pending:
-            middle = self._forces_half_way(step) if self.bodies.closed else None
-            forces = self.nodal_forces(self.u)
-            self.pairing.book(forces, middle, step, trial.work, len(self.loads))
+        self.pairing.book(
+            self.bodies, self.u, step, trial.work, len(self.loads),
+            lambda: self.nodal_forces(self.u),
+        )  # fmt: skip
         step.destroy()
         inertia = self.bodies.inertia
         if self._begun:
@@ -310,16 +314,6 @@ class NewtonSolver(InterfaceSolver):
         if trial.work.contact:
             assert inertia is not None
             inertia.add_loss(trial.work.contact)
-
-    def _forces_half_way(self, step: PETSc.Vec) -> PETSc.Vec:
-        """Nodal forces half a step before the accepted state, where the bodies are afterwards."""
-        half = step.copy()
-        half.aypx(-0.5, self.u)
-        self.bodies.set(half)
-        forces = self.nodal_forces(half)
-        self.bodies.set(self.u)
-        half.destroy()
-        return forces
 
     def revert(self) -> None:
         """Reject the last trial; collective."""

@@ -217,7 +217,9 @@ class Analysis:
         stored = solver.stored(solver.state)
         self.balance.kinetic = stored.get("kinetic_energy", 0.0)
         strain = sum(stored.values()) - self.balance.kinetic
-        solver.overlap_energy = strain - solver.extra_work(solver.state)
+        solver.overlap_energy = (
+            strain + sum(solver.spent().values()) - solver.extra_work(solver.state)
+        )
         if overlap.any():
             log.warn(
                 "%d open nodes overlap the face they are to touch by up to %.3g before any load "
