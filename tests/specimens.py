@@ -12,9 +12,11 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 import fxcrack as fx
+from fxcrack.demos import thermal_bilayer
 from fxcrack.history import Row
 from fxcrack.interface.surface import FacetSurface, facet_element
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
+from fxcrack.meshes.enf import enf_2d
 
 Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
@@ -119,6 +121,49 @@ def fatigue_specimen(
 ) -> fx.Scene:
     """The bench specimen, coarse, to be fatigued."""
     return dcb(comm, dx=1.0, ny=2, criterion=criterion or fatigue_law(), **options)
+
+
+def fatigue_enf(
+    comm: MPI.Intracomm = MPI.COMM_WORLD,
+    *,
+    a0: float,
+    dx: float,
+    GIc: float = 10.0,
+    friction: float | None = None,
+    **options: Any,
+) -> fx.Scene:
+    """End-notched flexure with contact, to be pressed to and fro."""
+    debond = fx.Debond(bond(a0, contact=True, friction=friction), fatigue_law(GIc=GIc))
+    return fx.Scene(
+        enf_2d(comm, half_span=50.0, height=2.25, dx=dx, ny=2),
+        materials=STEEL,
+        model=fx.PlaneStress(thickness=25.0),
+        supports=[
+            fx.Displacement("support_left", y=0.0),
+            fx.Displacement("support_right", x=0.0, y=0.0),
+            fx.Displacement("load", y=-1.0),
+        ],
+        debonds=[debond],
+        **options,
+    )
+
+
+def fatigue_bilayer(temperature: fx.Temperature, **options: Any) -> fx.Scene:
+    """Two layers that part as they cool, four of their thicknesses apart already."""
+    growth = fx.Paris(0.0, -1.0, 1e-2, 3.0, 0.0, 0.99)
+    return fx.Scene(
+        thermal_bilayer.layers(0.5),
+        materials={"upper": thermal_bilayer.UPPER, "lower": thermal_bilayer.LOWER},
+        model=fx.PlaneStrain(),
+        supports=[
+            fx.Displacement("middle_upper", x=0.0),
+            fx.Displacement("middle_lower", x=0.0),
+            fx.Displacement("foot", y=0.0),
+        ],
+        debonds=[fx.Debond(bond(4.0), fx.Fatigue(GIc=10.0, paris=growth, method="closure"))],
+        effects=[temperature],
+        **options,
+    )
 
 
 def until_length(scene: fx.Scene, length: float) -> fx.CrackLength:

@@ -9,8 +9,8 @@ import fxcrack as fx
 from fxcrack.deck.write_shells import MOVED, ROTATIONS
 from fxcrack.meshes.dcb import dcb_3d
 from fxcrack.meshes.sheets import Sheet, sheets
+from tests.shell_arms import UD, bond, two_arms
 from tests.test_deck_write import round_trip
-from tests.test_shell_interfaces import UD, bond, two_arms
 
 LAMINATE = fx.Laminate([fx.Ply(0.5, 0.0, UD), fx.Ply(0.4, 45.0, UD), fx.Ply(0.6, 90.0, UD)])
 # the numbers of degrees of freedom, the order of the sums and the axis, which is found again from

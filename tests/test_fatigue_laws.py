@@ -14,6 +14,7 @@ from specimens import (
     HALF_OPENING,
     PARIS,
     bond,
+    fatigue_bilayer,
     fatigue_law,
     fatigue_specimen,
     growth_curve,
@@ -264,19 +265,7 @@ def test_laws_of_the_user_are_checked(law: Any, says: str) -> None:
 @pytest.mark.verification
 def test_temperature_cycles_grow_a_bilayer() -> None:
     """Cooling by 200 and by 50 in turn: G goes with the square, steady state in closed form."""
-    growth = fx.Paris(0.0, -1.0, 1e-2, 3.0, 0.0, 0.99)
-    scene = fx.Scene(
-        thermal_bilayer.layers(0.5),
-        materials={"upper": thermal_bilayer.UPPER, "lower": thermal_bilayer.LOWER},
-        model=fx.PlaneStrain(),
-        supports=[
-            fx.Displacement("middle_upper", x=0.0),
-            fx.Displacement("middle_lower", x=0.0),
-            fx.Displacement("foot", y=0.0),
-        ],
-        debonds=[fx.Debond(bond(4.0), fx.Fatigue(GIc=10.0, paris=growth, method="closure"))],
-        effects=[fx.Temperature(-1.0)],
-    )
+    scene = fatigue_bilayer(fx.Temperature(-1.0))
     history = scene.run(fx.Cycles(maximum=200.0, minimum=50.0, until=until_length(scene, 7.0)))
     rows = [r for r in history if r["event"] in GROWS]
     top, dG = (np.array([r[k] for r in rows]) for k in ("G_max[bond]", "dG[bond]"))

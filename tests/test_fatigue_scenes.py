@@ -16,6 +16,7 @@ from specimens import (
     STEEL,
     bond,
     column,
+    fatigue_enf,
     fatigue_law,
     fatigue_specimen,
     growth_curve,
@@ -28,7 +29,6 @@ import fxcrack as fx
 from fxcrack.criteria import total
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
-from fxcrack.meshes.enf import enf_2d
 from fxcrack.meshes.penny import penny
 
 # --- the cycle itself -----------------------------------------------------------------------------
@@ -50,18 +50,7 @@ def sampled(scene: fx.Scene, corners: list[np.ndarray], n: int = 101) -> tuple[f
 @pytest.mark.quick("0.1", "-1.0")
 @pytest.mark.parametrize("ratio", [0.5, 0.1, 0.0, -0.4, -1.0])
 def test_end_notched_flexure_with_contact_equals_its_sampled_cycle(ratio):
-    mesh = enf_2d(half_span=50.0, height=2.25, dx=1.0, ny=2)
-    scene = fx.Scene(
-        mesh,
-        materials=STEEL,
-        model=fx.PlaneStress(thickness=25.0),
-        supports=[
-            fx.Displacement("support_left", y=0.0),
-            fx.Displacement("support_right", x=0.0, y=0.0),
-            fx.Displacement("load", y=-1.0),
-        ],
-        debonds=[fx.Debond(bond(35.0, contact=True), fatigue_law(GIc=10.0))],
-    )
+    scene = fatigue_enf(a0=35.0, dx=1.0)
     history = scene.run(fx.Cycles(maximum=1.5, ratio=ratio, n_max=1e-6))
     row, loads = history.rows[-1], scene.loads_at(1.5)
     top, bottom = sampled(scene, [loads, ratio * loads])

@@ -11,9 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
-from test_shell_interfaces import (
+from shell_arms import (
     A0,
     E1,
+    E3,
+    FAST,
+    G13,
     HEIGHT,
     UD,
     WIDTH,
@@ -21,37 +24,16 @@ from test_shell_interfaces import (
     dcb,
     enf,
     mean_rates,
+    of_one_ply,
     over_beam_theory,
-    two_arms,
+    slb,
 )
 
 import fxcrack as fx
 from fxcrack.continuum.face_compliance import section_compliance
 from fxcrack.meshes.blocks import Blocks, build
 
-FAST = fx.Static(until=fx.Time(1.0))
-G13, E3, G23 = 4600.0, 10160.0, 3540.0
-
-
-def slb(comm: MPI.Intracomm, heights: tuple[float, float], dx: float, a: float = 16.0) -> fx.Scene:
-    """Single leg bending of shells whose bonds yield as the arms do, half span 32, 1 wide."""
-    scene = fx.Scene(
-        two_arms(comm, length=64.0, width=1.0, heights=heights, dx=dx, load_at=32.0),
-        model=fx.Shell(),
-        materials={
-            "upper": fx.Section(UD, thickness=heights[0]),
-            "lower": fx.Section(UD, thickness=heights[1]),
-        },
-        supports=[
-            fx.Displacement("upper_a0", z=0.0),
-            fx.Displacement("upper_a1", x=0.0, z=0.0),
-            fx.Displacement("upper_b0", y=0.0),
-        ],
-        loads=[fx.PointForce(f"load_{i}", (0.0, 0.0, -0.5)) for i in (0, 1)],
-        debonds=[fx.Debond(bond(a, stiffness="arms"), fx.VCCT(GIc=1.0))],
-    )
-    scene.run(FAST, progress=False)
-    return scene
+G23 = 3540.0
 
 
 @pytest.mark.parametrize(
@@ -66,7 +48,7 @@ def test_mode_mix_of_bending_specimens(
 
     Solids have 0.374, 0.34 to 0.37, 0.44 to 0.41 from coarse to fine.
     """
-    scene = slb(comm, heights, 1.0)
+    scene = slb(comm, of_one_ply(heights), stiffness="arms")
     found = mean_rates(scene)
     assert found.sum() == pytest.approx(solids, rel=1e-2)
     assert found[1] / found.sum() == pytest.approx(share, abs=3e-3)
@@ -77,10 +59,10 @@ def test_rate_is_the_slope_of_the_energy(comm: MPI.Intracomm) -> None:
     """VCCT beside the energy of the whole at the neighbouring positions of the front."""
     energies = []
     for a in (15.0, 17.0):
-        scene = slb(comm, (1.5, 1.5), 1.0, a)
+        scene = slb(comm, of_one_ply((1.5, 1.5)), a=a, stiffness="arms")
         energies.append(scene.history["strain_energy"][-1])
         scene.close()
-    between = slb(comm, (1.5, 1.5), 1.0)
+    between = slb(comm, of_one_ply((1.5, 1.5)), stiffness="arms")
     assert 0.5 * (energies[1] - energies[0]) == pytest.approx(mean_rates(between).sum(), rel=5e-3)
     between.close()
 
@@ -229,7 +211,7 @@ def test_closure_beside_compliant_bonds_warns(
     comm: MPI.Intracomm, caplog: pytest.LogCaptureFixture
 ) -> None:
     """One node of a front is not its row: 5 % less G than by VCCT in the same state."""
-    scene = slb(comm, (1.5, 1.5), 2.0)
+    scene = slb(comm, of_one_ply((1.5, 1.5)), 2.0, stiffness="arms")
     (debond,) = scene.debonds
     closure = fx.Debond(debond.interface, fx.VCCT(GIc=1.0, method="closure"))
     twin = scene.rebuilt(debonds=[closure])

@@ -13,6 +13,24 @@ from typing import Any
 import numpy as np
 import pytest
 from mpi4py import MPI
+from shell_arms import (
+    A0,
+    E1,
+    E3,
+    FAST,
+    G13,
+    HEIGHT,
+    UD,
+    WIDTH,
+    bond,
+    dcb,
+    enf,
+    mean_rates,
+    of_one_ply,
+    over_beam_theory,
+    slb,
+    two_arms,
+)
 
 import fxcrack as fx
 from fxcrack.base import compat
@@ -20,93 +38,10 @@ from fxcrack.beam_theory import CorrectedBeam
 from fxcrack.mesh import Group
 from fxcrack.meshes.sheets import Sheet, sheets
 
-UD = fx.Orthotropic(
-    E=(139400.0, 10160.0, 10160.0), nu=(0.30, 0.30, 0.436), G=(4600.0, 4600.0, 3540.0)
-)
-E1, E3, G13 = 139400.0, 10160.0, 4600.0
 SAME = 3e-3
-FAST = fx.Static(until=fx.Time(1.0))
-
-
-def two_arms(
-    comm: MPI.Intracomm,
-    *,
-    length: float,
-    width: float,
-    heights: tuple[float, float],
-    dx: float,
-    ny: int = 1,
-    element: tuple[str, int] = ("quadrilateral", 1),
-    load_at: float | None = None,
-) -> fx.Mesh:
-    """Upper and lower arm as sheets in the middles of their heights."""
-    x, y = np.linspace(0.0, length, round(length / dx) + 1), np.linspace(0.0, width, ny + 1)
-    points = {}
-    if load_at is not None:
-        points = {f"load_{i}": (load_at, s) for i, s in enumerate((0.0, width))}
-    upper = Sheet("upper", x, y, lambda a, b: (a, b, 0.5 * heights[0] + 0.0 * a), points)
-    lower = Sheet("lower", x, y, lambda a, b: (a, b, -0.5 * heights[1] + 0.0 * a))
-    return sheets([upper, lower], comm, cell=element[0], order=element[1], name="arms")
-
-
-def bond(a0: float, **options: Any) -> fx.Interface:
-    return fx.Interface(
-        slave=fx.Face("lower", "top"),
-        master=fx.Face("upper", "bottom"),
-        bonded=lambda x: x[0] >= a0 - 1e-6,
-        name="bond",
-        **options,
-    )
-
-
-def mean_rates(scene: fx.Scene) -> np.ndarray[Any, np.dtype[np.float64]]:
-    """Energy release rates of the modes, means over the width of the front, shape (3,)."""
-    crack = scene.cracks[0]
-    tips = crack.tips()
-    values = crack.evaluate(tips, scene.solver.state, scene.time)
-    share = tips.area / tips.area.sum()
-    return np.array([float(share @ values.report[mode]) for mode in ("GI", "GII", "GIII")])
 
 
 # -- mode I ----------------------------------------------------------------------------------------
-
-LENGTH, WIDTH, HEIGHT, A0 = 100.0, 25.0, 1.5, 30.0
-
-
-def dcb(
-    comm: MPI.Intracomm,
-    element: tuple[str, int],
-    dx: float,
-    ny: int = 1,
-    height: float = HEIGHT,
-    **more: Any,
-) -> Any:
-    mesh = two_arms(
-        comm, length=LENGTH, width=WIDTH, heights=(height, height), dx=dx, ny=ny, element=element
-    )
-    given: dict[str, Any] = {
-        "model": fx.Shell(),
-        "materials": fx.Section(UD, thickness=height),
-        "supports": [
-            fx.Clamp("upper_a1"),
-            fx.Clamp("lower_a1"),
-            fx.Displacement("upper_a0", z=0.5),
-            fx.Displacement("lower_a0", z=-0.5),
-        ],
-        "debonds": [fx.Debond(bond(A0), fx.VCCT(GIc=0.17))],
-    }
-    return fx.Scene(mesh, **{**given, **more})
-
-
-def over_beam_theory(scene: fx.Scene, height: float = HEIGHT) -> tuple[float, float]:
-    """Load over corrected beam theory's at its opening, G over its G at the model's own load."""
-    scene.run(fx.Static(until=fx.Time(0.01)), progress=False)  # before the onset
-    load = float(scene.history["R[upper_a0.z]"][-1]) / 0.01
-    ratio = 1.18 * np.sqrt(E1 * E3) / G13
-    chi = np.sqrt(E1 / (11.0 * G13) * (3.0 - 2.0 * (ratio / (1.0 + ratio)) ** 2))
-    inertia, a = WIDTH * height**3 / 12.0, A0 + chi * height
-    rate = float(mean_rates(scene).sum()) / 0.01**2
-    return load * 2.0 * a**3 / (3.0 * E1 * inertia), rate * WIDTH * E1 * inertia / (load * a) ** 2
 
 
 @pytest.mark.mpi
@@ -258,23 +193,7 @@ def test_slb(
 ) -> None:
     """Single leg bending, a = 16, half span 32, strip 1 wide; solids have mode II shares of 0.374,
     0.34 to 0.37 and 0.44 to 0.41."""
-    mesh = two_arms(comm, length=64.0, width=1.0, heights=heights, dx=1.0, load_at=32.0)
-    scene = fx.Scene(
-        mesh,
-        model=fx.Shell(),
-        materials={
-            "upper": fx.Section(UD, thickness=heights[0]),
-            "lower": fx.Section(UD, thickness=heights[1]),
-        },
-        supports=[
-            fx.Displacement("upper_a0", z=0.0),
-            fx.Displacement("upper_a1", x=0.0, z=0.0),
-            fx.Displacement("upper_b0", y=0.0),
-        ],
-        loads=[fx.PointForce(f"load_{i}", (0.0, 0.0, -0.5)) for i in (0, 1)],
-        debonds=[fx.Debond(bond(16.0), fx.VCCT(GIc=1.0))],
-    )
-    scene.run(FAST, progress=False)
+    scene = slb(comm, of_one_ply(heights))
     found = mean_rates(scene)
     assert found.sum() / solids - 1.0 == pytest.approx(rate, abs=SAME)
     assert found[1] / found.sum() == pytest.approx(share, abs=SAME)
@@ -283,51 +202,12 @@ def test_slb(
 def test_slb_of_coupled_arms(comm: MPI.Intracomm) -> None:
     """Arms [90/0] and [0/90], 90 degrees on both sides of the crack; G and G_II/G of solids with
     cells for each ply, 3.835e-3 and 0.456, less what plates do not see."""
-    mesh = two_arms(comm, length=64.0, width=1.0, heights=(1.5, 1.5), dx=1.0, load_at=32.0)
-    scene = fx.Scene(
-        mesh,
-        model=fx.Shell(),
-        materials={
-            "upper": fx.Section(fx.Laminate("[90/0]", UD, 0.75)),
-            "lower": fx.Section(fx.Laminate("[0/90]", UD, 0.75)),
-        },
-        supports=[
-            fx.Displacement("upper_a0", z=0.0),
-            fx.Displacement("upper_a1", x=0.0, z=0.0),
-            fx.Displacement("upper_b0", y=0.0),
-        ],
-        loads=[fx.PointForce(f"load_{i}", (0.0, 0.0, -0.5)) for i in (0, 1)],
-        debonds=[fx.Debond(bond(16.0), fx.VCCT(GIc=1.0))],
-    )
-    scene.run(FAST, progress=False)
+    plies = (fx.Laminate(lay_up, UD, 0.75) for lay_up in ("[90/0]", "[0/90]"))
+    upper, lower = (fx.Section(each) for each in plies)
+    scene = slb(comm, (upper, lower))
     found = mean_rates(scene)
     assert found.sum() / 3.835e-3 - 1.0 == pytest.approx(-0.044, abs=SAME)
     assert found[1] / found.sum() == pytest.approx(0.437, abs=SAME)
-
-
-def enf(comm: MPI.Intracomm, dx: float = 1.0, **options: Any) -> fx.Scene:
-    """End notched flexure, a = 34, half span 88, h = 2.25, with contact of the offset faces."""
-    mesh = two_arms(comm, length=176.0, width=1.0, heights=(2.25, 2.25), dx=dx, load_at=88.0)
-    interface = fx.Interface(
-        slave=fx.Face("upper", "bottom"),
-        master=fx.Face("lower", "top"),
-        bonded=lambda x: x[0] >= 34.0 - 1e-6,
-        contact=True,
-        name="bond",
-        **options,
-    )
-    return fx.Scene(
-        mesh,
-        model=fx.Shell(),
-        materials=fx.Section(UD, thickness=2.25),
-        supports=[
-            fx.Displacement("lower_a0", z=0.0),
-            fx.Displacement("lower_a1", x=0.0, z=0.0),
-            fx.Displacement("lower_b0", y=0.0),
-        ],
-        loads=[fx.PointForce(f"load_{i}", (0.0, 0.0, -0.5)) for i in (0, 1)],
-        debonds=[fx.Debond(interface, fx.VCCT(GIc=1.0))],
-    )
 
 
 @pytest.mark.mpi

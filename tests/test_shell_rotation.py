@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mpi4py import MPI
 from scipy.optimize import brentq
-from test_shell_interfaces import mean_rates, two_arms
+from shell_arms import mean_rates, two_arms
 
 import fxcrack as fx
 from fxcrack.continuum.shell_bodies import ShellBodies

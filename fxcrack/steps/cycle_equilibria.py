@@ -41,7 +41,12 @@ class Corner(NamedTuple):
 
     def middle(self, other: Corner) -> Corner:
         """Half way to another one."""
-        return Corner(0.5 * (self.time + other.time), 0.5 * (self.loads + other.loads))
+        return self.towards(other, 0.5)
+
+    def towards(self, other: Corner, part: float) -> Corner:
+        """A part of the way to another one."""
+        rest = 1.0 - part
+        return Corner(rest * self.time + part * other.time, rest * self.loads + part * other.loads)
 
 
 @dataclass(frozen=True)
@@ -73,10 +78,17 @@ class CycleEquilibria(Protocol):
 
     Attributes:
         settles: Whether the first cycle is not yet a stabilised one.
+        in_order: Whether an instant is found from the one before it in the cycle only, so that a
+            piece cannot be halved afterwards.
     """
 
     @property
     def settles(self) -> bool:
+        """As above."""
+        ...
+
+    @property
+    def in_order(self) -> bool:
         """As above."""
         ...
 
@@ -103,6 +115,8 @@ class LinearEquilibria:
     Args:
         analysis: The analysis, at the maximum of the cycle.
     """
+
+    in_order = False
 
     def __init__(self, analysis: Analysis) -> None:
         self._analysis = analysis
@@ -149,12 +163,20 @@ class NewtonEquilibria:
         solver: Its solver.
     """
 
-    settles = False
-
     def __init__(self, analysis: Analysis, solver: NewtonSolver) -> None:
         self._analysis, self._solver = analysis, solver
         self._saved: Any = None
         self._found = 0
+
+    @property
+    def settles(self) -> bool:
+        """With friction slips settle over some cycles."""
+        return self._solver.system.friction is not None
+
+    @property
+    def in_order(self) -> bool:
+        """With friction an equilibrium depends on the one before."""
+        return self.settles
 
     def begin(self, corner: Corner) -> Instant:
         """See :meth:`CycleEquilibria.begin`."""
@@ -233,8 +255,6 @@ def equilibria_of(analysis: Analysis) -> CycleEquilibria:
         refused = "plasticity, as bodies that yield do not come back in a cycle"
     elif bodies.dynamic:
         refused = "Inertia, as cycles are sequences of equilibria; take Dynamic for vibrations"
-    elif any(pair.friction is not None for pair in solver.pairs):
-        refused = "friction on nonlinear bodies; leave one of the two out"
     elif solver.system.soft.bonds:
         refused = (
             "bonds that an earlier step has opened in part on nonlinear bodies; end that step "

@@ -6,7 +6,9 @@ in the fraction x of the way and G is a parabola in it,
     G(x) = 1/2 F(x) w(x)/A,      dG = max G - min G,
 
 so one equilibrium per corner of the cycle is enough. Where contact changes in between, or bodies
-are not linear, the piece is halved until its middle lies on that parabola, to a tolerance.
+are not linear, the piece is halved until its middle lies on that parabola, to a tolerance. With
+friction on nonlinear bodies the way cannot be taken up in its middle; there the whole cycle is
+passed anew, at twice as many instants each time, until the extremes of G keep to the tolerance.
 """
 
 from __future__ import annotations
@@ -32,6 +34,8 @@ from fxcrack.steps.element_growth import advance, cyclic_parts
 _GRID = np.linspace(0.0, 1.0, 5)
 _HALVINGS = 8
 """How often a piece of the cycle that is no parabola is halved at most."""
+_SAMPLINGS = 6
+"""How often each piece of a cycle with friction is halved at most."""
 _SETTLING = 20
 """Cycles that friction gets to settle."""
 
@@ -82,10 +86,47 @@ class StabilisedCycle:
             else:
                 N = self._analysis.fatigue.N
                 log.warn("friction does not settle in the cycle at N = %g", N)
+        if equilibria.in_order:
+            return self._sampled(instants, [corners[0], *ends])
         way = instants[:1]
         for a, b in pairwise(instants):
             way += self._between(a, b, largest, _HALVINGS)
         return way
+
+    def _sampled(self, way: list[Instant], corners: list[Corner]) -> list[Instant]:
+        """Instants of a cycle so close that the extremes of G do not change by twice as many.
+
+        Args:
+            way: Instants of the settled cycle, one per corner.
+            corners: Corners of the cycle from its maximum back to it.
+        """
+        before = self._ranges(way)
+        for halvings in range(1, _SAMPLINGS + 1):
+            parts = np.arange(1, 2**halvings + 1) / 2**halvings
+            fine = [a.towards(b, x) for a, b in pairwise(corners) for x in parts.tolist()]
+            way, _ = self._once(way[-1], fine)
+            now = self._ranges(way)
+            if np.all(np.abs(now - before) <= self._change * now[1]):
+                return way
+            before = now
+        N = self._analysis.fatigue.N
+        log.warn("friction changes too often in the cycle at N = %g to follow G", N)
+        return way
+
+    def _ranges(self, way: list[Instant]) -> Array:
+        """Smallest and largest total rate at each tip, shape (2, n_tips) [force/length]."""
+        pieces = []
+        for a, b in pairwise(way):
+            sums = [np.zeros((2, 0))]
+            for i, (g, v) in enumerate(self._analysis.at_tips()):
+                if len(v.tips):
+                    evaluator = cyclic_parts(g)[1]
+                    rates, _ = rates_between(evaluator, v.tips, a.measured[i], b.measured[i])
+                    found = total(rates)
+                    sums.append(np.stack([found.min(axis=0), found.max(axis=0)]))
+            pieces.append(np.concatenate(sums, axis=1))
+        every = np.array(pieces)
+        return np.stack([every[:, 0].min(axis=0), every[:, 1].max(axis=0)])
 
     def _once(self, start: Instant, ends: list[Corner]) -> tuple[list[Instant], Array]:
         """Instants of one cycle and the largest rate at each tip."""

@@ -3,7 +3,7 @@
 A cycle runs between two load states, or once through amplitudes that end where they began. Bodies
 are elastic, so an equilibrium without friction depends on the loads alone and not on the way to
 them: every cycle is a stabilised one, and solving its corners replaces the Fourier series of a
-direct cyclic analysis exactly. Friction, on linear bodies, settles over some cycles.
+direct cyclic analysis exactly. Friction settles over some cycles.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ class Cycles:
 
     On nonlinear bodies (finite strain, pressures that follow, moduli that change with the
     temperature) each instant is an equilibrium of its own, found on the tangent of the one before.
-    A temperature and pressures that follow must be linear in time between maximum and minimum.
+    A temperature and pressures that follow must be linear in time between maximum and minimum. With
+    friction the whole cycle is passed at 2, 4, 8, ... instants per piece, until the extremes of G
+    change by less than ``change`` of G_max.
 
     Bonds are released at the maximum of the cycle (with ``period`` at its corner of largest f);
     the step ends there, too. With neither ``n_max`` nor ``until`` it ends when no tip grows any
