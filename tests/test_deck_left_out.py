@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.deck.cards import DeckError
+from fxcrack.deck.ties import reached
 from tests.decks import BONDED, OPENED, PLATE, STEP, VCCT, read, write
 
 
@@ -56,6 +57,19 @@ def test_op_new_without_data_takes_all_away(tmp_path):
     assert load.amplitude(1.0) * load.value[1] == 1.0 and load.amplitude(2.0) == 0.0
     with pytest.raises(DeckError, match="there is no data line"):
         read(tmp_path, PLATE + first + second.replace(", OP=NEW", ""))
+
+
+def test_ties_reach_large_facets_beside_small_ones():
+    """Nodes on a facet of 20 x 1 reach it, though 12 small ones beside it are nearer by centre."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    places = np.array([[i, j, 0.0] for i in range(6) for j in range(20)])
+    facets = [*(corners + p for p in places), corners * [-20.0, 20.0, 1.0]]
+    x = np.array([[-0.9, y, 0.0] for y in np.linspace(0.0, 20.0, 9)])
+    assert reached(x, np.array(facets), 0.1).all()
+    off = np.array([0.0, 0.0, 0.1])  # just the tolerance, whatever the round-off
+    assert reached(x + off, np.array(facets), 0.1).all()
+    assert not reached(x + 1.001 * off, np.array(facets), 0.1).any()
+    assert not reached(x - [20.0, 0.0, 0.0], np.array(facets), 0.1).any()
 
 
 @pytest.mark.mpi
