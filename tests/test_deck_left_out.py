@@ -30,6 +30,16 @@ def test_materials_and_interactions_that_nothing_names(tmp_path):
         read(tmp_path, text.replace("MATERIAL=M", "MATERIAL=USER") + OPENED.format(criterion=VCCT))
 
 
+def test_what_follows_a_material_that_nothing_names(tmp_path):
+    spare = "*MATERIAL, NAME=SPARE\n*CONDUCTIVITY\n1.\n*DENSITY\n7.\n*EXPANSION\n1e-5\n*MYSTERY\n"
+    found = read(tmp_path, PLATE + spare + STEP)
+    (steel,) = found.arguments["materials"].values()
+    assert steel == fx.Isotropic(200.0, 0.25)  # density and expansion are not those of SPARE
+    assert "*MYSTERY, taken for data of the material 'SPARE'" in found.report.ignored
+    with pytest.raises(DeckError, match="EMBEDDED ELEMENT is refused"):
+        read(tmp_path, PLATE + spare + "*EMBEDDED ELEMENT\nLAST\n" + STEP)
+
+
 def test_perturbation_steps_beside_others(tmp_path):
     frequency = "*STEP, NAME=MODES, PERTURBATION\n*FREQUENCY\n5\n*BOUNDARY\nLEFT, 2\n*END STEP\n"
     found = read(tmp_path, PLATE + STEP + frequency + STEP)
