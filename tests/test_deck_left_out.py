@@ -71,7 +71,7 @@ def test_op_new_without_data_takes_all_away(tmp_path):
 
 def test_ties_reach_large_facets_beside_small_ones():
     """Nodes on a facet of 20 x 1 reach it, though 12 small ones beside it are nearer by centre."""
-    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
     places = np.array([[i, j, 0.0] for i in range(6) for j in range(20)])
     facets = [*(corners + p for p in places), corners * [-20.0, 20.0, 1.0]]
     x = np.array([[-0.9, y, 0.0] for y in np.linspace(0.0, 20.0, 9)])
@@ -80,6 +80,28 @@ def test_ties_reach_large_facets_beside_small_ones():
     assert reached(x + off, np.array(facets), 0.1).all()
     assert not reached(x + 1.001 * off, np.array(facets), 0.1).any()
     assert not reached(x - [20.0, 0.0, 0.0], np.array(facets), 0.1).any()
+
+
+def test_ties_reach_all_of_a_face_of_hexahedra(tmp_path, caplog):
+    """A block of 3 x 3 elements on one that is three times as wide: all nodes lie on its face."""
+    fine = [(i, j, k) for k in (0, 1) for j in range(4) for i in range(4)]
+    nodes = [f"{n + 1}, {i}., {j}., {k}." for n, (i, j, k) in enumerate(fine)]
+    wide = [(0, 0), (3, 0), (3, 3), (0, 3)]
+    nodes += [f"{41 + n}, {i}., {j}., -1." for n, (i, j) in enumerate(wide)]
+    nodes += [f"{45 + n}, {i}., {j}., 0." for n, (i, j) in enumerate(wide)]
+    around = [1, 2, 6, 5, 17, 18, 22, 21]
+    cells = [[4 * j + i + n for n in around] for j in range(3) for i in range(3)]
+    elements = [", ".join(map(str, [1 + e, *cell])) for e, cell in enumerate(cells)]
+    text = "\n".join(
+        ["*NODE", *nodes, "*ELEMENT, TYPE=C3D8, ELSET=FINE", *elements,
+         "*ELEMENT, TYPE=C3D8, ELSET=WIDE", "11, 41, 42, 43, 44, 45, 46, 47, 48",
+         "*SURFACE, NAME=UPPER", "FINE, S1", "*SURFACE, NAME=LOWER", "WIDE, S2",
+         "*SOLID SECTION, ELSET=FINE, MATERIAL=M", "*SOLID SECTION, ELSET=WIDE, MATERIAL=M",
+         "*MATERIAL, NAME=M", "*ELASTIC", "200., 0.25", "*TIE, NAME=T", "UPPER, LOWER",
+         "*STEP", "*STATIC", "*BOUNDARY", "41, 1, 3", "*END STEP", ""]
+    )  # fmt: skip
+    (interface,) = read(tmp_path, text).arguments["bonds"]
+    assert callable(interface.bonded) and "beyond the tolerance" not in caplog.text
 
 
 @pytest.mark.mpi

@@ -92,7 +92,8 @@ def _tied_nodes(
 
 def _size(facets: Array) -> float:
     """Median edge of facets, length; as that of the surfaces of interfaces."""
-    return float(np.median(np.linalg.norm(facets - np.roll(facets, 1, axis=1), axis=-1)))
+    corners = facets[:, [0, 1, 3, 2]] if facets.shape[1] == 4 else facets
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)))
 
 
 def reached(x: Array, facets: Array, tolerance: float) -> Bools:
@@ -100,7 +101,8 @@ def reached(x: Array, facets: Array, tolerance: float) -> Bools:
 
     Args:
         x: Positions, shape (n, 3), length.
-        facets: Corners of the facets, shape (n_facets, 2 to 4, 3), length.
+        facets: Corners of the facets in the order of rows of facets, where the last corner of four
+            lies across from the first, shape (n_facets, 2 to 4, 3), length.
         tolerance: Length.
 
     Returns:
@@ -113,7 +115,7 @@ def reached(x: Array, facets: Array, tolerance: float) -> Bools:
     elif k == 3:
         triangles = facets
     else:
-        triangles = np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
+        triangles = np.concatenate([facets[:, [0, 1, 2]], facets[:, [1, 3, 2]]])
     centre = triangles.mean(axis=1)
     radius = np.linalg.norm(triangles - centre[:, None], axis=-1).max(axis=1)
     tree = cKDTree(x)
