@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.deck.cards import DeckError
+from fxcrack.deck.ties import reached
 from tests.decks import BONDED, OPENED, PLATE, STEP, VCCT, read, write
 
 
@@ -27,6 +28,16 @@ def test_materials_and_interactions_that_nothing_names(tmp_path):
         read(tmp_path, named + OPENED.format(criterion=VCCT))
     with pytest.raises(DeckError, match="DEPVAR is refused"):
         read(tmp_path, text.replace("MATERIAL=M", "MATERIAL=USER") + OPENED.format(criterion=VCCT))
+
+
+def test_what_follows_a_material_that_nothing_names(tmp_path):
+    spare = "*MATERIAL, NAME=SPARE\n*CONDUCTIVITY\n1.\n*DENSITY\n7.\n*EXPANSION\n1e-5\n*MYSTERY\n"
+    found = read(tmp_path, PLATE + spare + STEP)
+    (steel,) = found.arguments["materials"].values()
+    assert steel == fx.Isotropic(200.0, 0.25)  # density and expansion are not those of SPARE
+    assert "*MYSTERY, taken for data of the material 'SPARE'" in found.report.ignored
+    with pytest.raises(DeckError, match="EMBEDDED ELEMENT is refused"):
+        read(tmp_path, PLATE + spare + "*EMBEDDED ELEMENT\nLAST\n" + STEP)
 
 
 def test_perturbation_steps_beside_others(tmp_path):
@@ -56,6 +67,41 @@ def test_op_new_without_data_takes_all_away(tmp_path):
     assert load.amplitude(1.0) * load.value[1] == 1.0 and load.amplitude(2.0) == 0.0
     with pytest.raises(DeckError, match="there is no data line"):
         read(tmp_path, PLATE + first + second.replace(", OP=NEW", ""))
+
+
+def test_ties_reach_large_facets_beside_small_ones():
+    """Nodes on a facet of 20 x 1 reach it, though 12 small ones beside it are nearer by centre."""
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])
+    places = np.array([[i, j, 0.0] for i in range(6) for j in range(20)])
+    facets = [*(corners + p for p in places), corners * [-20.0, 20.0, 1.0]]
+    x = np.array([[-0.9, y, 0.0] for y in np.linspace(0.0, 20.0, 9)])
+    assert reached(x, np.array(facets), 0.1).all()
+    off = np.array([0.0, 0.0, 0.1])  # just the tolerance, whatever the round-off
+    assert reached(x + off, np.array(facets), 0.1).all()
+    assert not reached(x + 1.001 * off, np.array(facets), 0.1).any()
+    assert not reached(x - [20.0, 0.0, 0.0], np.array(facets), 0.1).any()
+
+
+def test_ties_reach_all_of_a_face_of_hexahedra(tmp_path, caplog):
+    """A block of 3 x 3 elements on one that is three times as wide: all nodes lie on its face."""
+    fine = [(i, j, k) for k in (0, 1) for j in range(4) for i in range(4)]
+    nodes = [f"{n + 1}, {i}., {j}., {k}." for n, (i, j, k) in enumerate(fine)]
+    wide = [(0, 0), (3, 0), (3, 3), (0, 3)]
+    nodes += [f"{41 + n}, {i}., {j}., -1." for n, (i, j) in enumerate(wide)]
+    nodes += [f"{45 + n}, {i}., {j}., 0." for n, (i, j) in enumerate(wide)]
+    around = [1, 2, 6, 5, 17, 18, 22, 21]
+    cells = [[4 * j + i + n for n in around] for j in range(3) for i in range(3)]
+    elements = [", ".join(map(str, [1 + e, *cell])) for e, cell in enumerate(cells)]
+    text = "\n".join(
+        ["*NODE", *nodes, "*ELEMENT, TYPE=C3D8, ELSET=FINE", *elements,
+         "*ELEMENT, TYPE=C3D8, ELSET=WIDE", "11, 41, 42, 43, 44, 45, 46, 47, 48",
+         "*SURFACE, NAME=UPPER", "FINE, S1", "*SURFACE, NAME=LOWER", "WIDE, S2",
+         "*SOLID SECTION, ELSET=FINE, MATERIAL=M", "*SOLID SECTION, ELSET=WIDE, MATERIAL=M",
+         "*MATERIAL, NAME=M", "*ELASTIC", "200., 0.25", "*TIE, NAME=T", "UPPER, LOWER",
+         "*STEP", "*STATIC", "*BOUNDARY", "41, 1, 3", "*END STEP", ""]
+    )  # fmt: skip
+    (interface,) = read(tmp_path, text).arguments["bonds"]
+    assert callable(interface.bonded) and "beyond the tolerance" not in caplog.text
 
 
 @pytest.mark.mpi

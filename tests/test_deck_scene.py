@@ -291,6 +291,19 @@ def test_pressures_tractions_body_forces_and_gravity(tmp_path):
     assert loads["LAST.P3 2"].value(np.array([[0.0], [0.5], [0.0]])) == pytest.approx(1.0)
 
 
+def test_levels_of_hydrostatic_pressures_in_later_steps(tmp_path):
+    """The level rises in the second step: OP=NEW says so, without it what is meant is not clear."""
+    text = PLATE + "*BOUNDARY\nLEFT, PINNED\n" + stepped("*DLOAD", "LAST, HP3, 2., 0., 1.")
+    risen = text + stepped("*DLOAD, OP=NEW", "LAST, HP3, 2., 0., 4.")
+    before, after = arguments(tmp_path, risen)["loads"]
+    at = np.array([[0.0], [0.5], [0.0]])
+    assert [before.amplitude(t) * before.value(at) for t in (1.0, 2.0)] == [1.0, 0.0]
+    assert [after.amplitude(t) * after.value(at) for t in (1.0, 2.0)] == [0.0, 0.25]
+    refused(tmp_path, risen.replace(", OP=NEW", ""), "has the levels 0 and 1 from a step before")
+    both = text.replace("2., 0., 1.\n", "2., 0., 1.\nLAST, HP3, 1., 0., 4.\n")
+    assert len(arguments(tmp_path, both)["loads"]) == 2  # of one step they are added
+
+
 def test_shear_tractions_lie_in_their_surface(tmp_path):
     """On the edge x = 2 the direction (3, 4) is projected on y: the magnitude stays."""
     step = stepped("*DSLOAD", "END, TRSHR, 5., 3., 4., 0.")

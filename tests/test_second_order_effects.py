@@ -102,6 +102,20 @@ def test_part_of_the_buckling_load(
     strut.close()
 
 
+@pytest.mark.parametrize(("length", "dx", "ny"), [(24.0, 1.0, 1), (30.0, 2.0, 2), (40.0, 2.0, 3)])
+def test_arms_that_have_come_apart(
+    caplog: pytest.LogCaptureFixture, length: float, dx: float, ny: int
+) -> None:
+    """They move without strain: their energy is round-off, over which nothing counts."""
+    pins = fx.Displacement("pin_top", x=0.0, y=1.3), fx.Displacement("pin_bottom", x=0.1, y=-1.0)
+    mesh = dcb_2d(MPI.COMM_SELF, length=length, dx=dx, ny=ny)
+    apart = specimen(mesh, a0=6.0, criterion=fx.VCCT(GIc=2e-4), supports=pins)
+    apart.run(fx.Static(until=fx.Time(1.0)), progress=False)
+    assert not any("membrane" in m or "buckle" in m for m in caplog.messages)
+    assert estimate(apart) == SecondOrderEffects(0.0, 0.0)
+    apart.close()
+
+
 def test_clamped_circular_plate(caplog: pytest.LogCaptureFixture) -> None:
     """Stretching of w0 (1 - r^2/a^2)^2 between fixed edges: 0.4713 (w0/t)^2 at nu = 0.3.
 

@@ -17,6 +17,17 @@ from fxcrack.deck.report import Report
 
 OF_MATERIALS = ("ELASTIC", "PLASTIC", "EXPANSION", "DENSITY", "HYPERELASTIC", "DAMPING")
 OF_INTERACTIONS = ("FRICTION", "SURFACEBEHAVIOR", "COHESIVEBEHAVIOR", "FRACTURECRITERION")
+_DAMAGE = ("DAMAGEINITIATION", "DAMAGEEVOLUTION", "DAMAGESTABILIZATION")
+_REFUSED_OF = {
+    "MATERIAL": (
+        *_DAMAGE,
+        *("USERMATERIAL", "DEPVAR", "USERDEFINEDFIELD", "CREEP", "VISCOELASTIC", "RATEDEPENDENT"),
+        *("DRUCKERPRAGER", "CONCRETE", "POTENTIAL", "CYCLICHARDENING", "DEFORMATIONPLASTICITY"),
+        *("HYPERFOAM", "INELASTICHEATFRACTION"),
+    ),
+    "SURFACEINTERACTION": (*_DAMAGE, "CONTACTDAMPING"),
+}
+"""Words that belong to a material or an interaction and are refused where it is used."""
 _PERTURBATIONS = frozenset(
     (
         *("FREQUENCY", "BUCKLE", "COMPLEXFREQUENCY", "STEADYSTATEDYNAMICS", "MODALDYNAMIC"),
@@ -64,23 +75,28 @@ def _families(
 ) -> list[Card]:
     """The cards without the families of a head that nothing names.
 
-    To a family belong its members and all that fxcrack refuses or does not know, up to the next
-    card that belongs elsewhere.
+    To a family belong its members, those that are refused elsewhere, and what fxcrack does not
+    know, of which each is named. Material data without effect on stresses may stand among them.
     """
     kept: list[Card] = []
-    inside, seen = False, set()
+    what = "material" if head == "MATERIAL" else "surface interaction"
+    inside, seen, name = False, set(), ""
     for card in cards:
         if card.keyword == head:
             name = key(card.options.get("NAME") or "")
             inside = bool(name) and name not in named and name not in seen
             seen.add(name)
             if inside:
-                what = "material" if head == "MATERIAL" else "surface interaction"
                 report.leave(f"{what} '{card.text('NAME')}', which nothing in the deck names")
         elif inside:
             known = KEYWORDS.get(card.keyword)
-            elsewhere = known is not None and known.kind in ("read", "output")
-            inside = card.keyword in members or not elsewhere
+            if known is None:
+                report.leave(f"{card.title}, taken for data of the {what} '{name}'")
+            elif known.kind == "output":
+                kept.append(card)
+                continue
+            else:
+                inside = card.keyword in (*members, *_REFUSED_OF[head])
         if not inside:
             kept.append(card)
     return kept

@@ -124,6 +124,7 @@ class Loads:
                 for row in card.rows():
                     mark, value = self._read(row)
                     entry = self._entries[mark]
+                    self._check_levels(row, entry, given)
                     if mark in given:
                         if entry.curve is not curve:
                             row.fail("the same load with two amplitudes in one step; give one")
@@ -138,6 +139,28 @@ class Loads:
             else:
                 entry.track.hold(period)
         self._past.append(period)
+
+    def _check_levels(self, row: Row, entry: LoadEntry, given: set[tuple[str, ...]]) -> None:
+        """Refuse a hydrostatic pressure whose levels change while it acts.
+
+        Args:
+            row: The line.
+            entry: Its load.
+            given: Loads of this step so far.
+        """
+        if entry.type[:2] != "HP":
+            return
+        for mark, other in self._entries.items():
+            alike = (other.kind, key(other.name), other.type) == (
+                entry.kind, key(entry.name), entry.type,
+            )  # fmt: skip
+            if alike and other is not entry and other.value != 0.0 and mark not in given:
+                row.fail(
+                    f"the hydrostatic pressure on '{entry.name}' has the levels "
+                    f"{other.zero[0]:g} and {other.zero[1]:g} from a step before; to change them "
+                    f"give OP=NEW on all *{entry.kind} cards of this step, and in them every load "
+                    "that goes on"
+                )
 
     def _read(self, row: Row) -> tuple[tuple[str, ...], float]:
         """The load that a line means, and its reference value."""
@@ -193,6 +216,7 @@ class Loads:
             key(name),
             word,
             *(f"{d:.12g}" for d in (*entry.direction, *entry.point)),
+            *(f"{level:.12g}" for level in entry.zero if word[:2] == "HP"),
         )
         self._entries.setdefault(mark, self._started(entry))
         return mark, row.number(2)
@@ -303,7 +327,9 @@ class Loads:
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
             if self._transforms.turned[nodes].any():
-                out.append(self._along_own_axes(entry, amplitude, force, nodes, where))
+                axes = "".join("123456"[i] for i in np.flatnonzero(force))
+                title = name if alone else f"{name}.{axes}"
+                out.append(self._along_own_axes(entry, amplitude, force, nodes, where, title))
                 continue
             moment, force = force[3:], force[: self._flat.kind.gdim]
             axes = "".join("xyz"[i] for i in np.flatnonzero(force))
@@ -339,8 +365,9 @@ class Loads:
         return PointForce(where, _fields(x, forces), amplitude, entry.name)
 
     def _along_own_axes(
-        self, entry: LoadEntry, amplitude: AmplitudeLike, load: Array, nodes: Ints, where: str
-    ) -> Load:
+        self, entry: LoadEntry, amplitude: AmplitudeLike, load: Array, nodes: Ints, where: str,
+        title: str,
+    ) -> Load:  # fmt: skip
         """A force on each of some nodes along the axes of that node."""
         if load[3:].any():
             entry.row.fail(
@@ -349,7 +376,7 @@ class Loads:
         gdim = self._flat.kind.gdim
         forces = np.einsum("nlg,l->ng", self._transforms.frames[nodes], load[:3])[:, :gdim]
         x = self._flat.points[nodes][:, :gdim]
-        return PointForce(where, _fields(x, forces * len(nodes)), amplitude, entry.name)
+        return PointForce(where, _fields(x, forces * len(nodes)), amplitude, title)
 
     def _of(
         self,

@@ -14,9 +14,11 @@ from fxcrack.deck.groups import Groups
 from fxcrack.interface.definition import Interface
 
 _REACH = 0.1
-"""Tolerance over the size of the master's facets where the deck gives none."""
-_NEIGHBOURS = 12
-"""Triangles of the master that are looked at, those with the nearest centres."""
+"""Tolerance over the median edge of the master's facets where the deck gives none."""
+_ROUND_OFF = 1e-6
+"""Part of the tolerance by which distances may differ."""
+_TOGETHER = 4000
+"""Triangles of the master that are looked at together."""
 
 
 def tie(row: Row, flat: Flat, groups: Groups, *, explicit: bool) -> Interface:
@@ -37,10 +39,11 @@ def tie(row: Row, flat: Flat, groups: Groups, *, explicit: bool) -> Interface:
         row.fail("a tie needs two surfaces, slave and master")
     card.choose("TYPE", ("NODE TO SURFACE", "SURFACE TO SURFACE"), "SURFACE TO SURFACE")
     tolerance = card.number("POSITION TOLERANCE", 0.0) or None
+    bonded, tolerance = _tied_nodes(row, (slave, master), flat, groups, tolerance)
     return Interface(
         groups.surface(card, slave, row.index, whole=False),
         groups.surface(card, master, row.index, whole=False),
-        bonded=_tied_nodes(row, (slave, master), flat, groups, tolerance),
+        bonded=bonded,
         tolerance=tolerance,
         pairing=None if explicit else pairing_of(card),
         name=card.text("NAME", default=slave),
@@ -55,22 +58,27 @@ def pairing_of(card: Card) -> str | None:
 
 def _tied_nodes(
     row: Row, names: tuple[str, str], flat: Flat, groups: Groups, tolerance: float | None
-) -> Everywhere | str:
-    """All slave nodes, or the name of those that reach the master."""
+) -> tuple[Everywhere | str, float | None]:
+    """All slave nodes, or the name of those that reach the master, and the search tolerance."""
     card, (slave, master) = row.card, names
     if flat.kind.shell:
-        return Everywhere(True)
+        return Everywhere(True), tolerance
     nodes = np.unique(flat.surface(card, slave, row.index, whole=False))
     rows = flat.surface(card, master, row.index, whole=False)
     n = {"tetrahedron": 3, "hexahedron": 4}.get(flat.kind.cell, 2)
-    found = reached(flat.points[nodes], flat.points[rows[:, :n]], tolerance)
+    facets = flat.points[rows[:, :n]]
+    if tolerance is None:
+        tolerance = _REACH * _size(facets)
+    found = reached(flat.points[nodes], facets, tolerance)
+    # the interface measures distances by itself, which round-off must not put beyond it
+    tolerance *= 1.0 + 2.0 * _ROUND_OFF
     if not found.any():
         row.fail(
             "no slave node lies within the tolerance of the master surface; move the surfaces "
             "together, or give POSITION TOLERANCE"
         )
     if found.all():
-        return Everywhere(True)
+        return Everywhere(True), tolerance
     log.warn(
         "%s: %d of %d slave nodes of '%s' lie beyond the tolerance of the master surface; they are "
         "not tied",
@@ -79,35 +87,47 @@ def _tied_nodes(
         len(nodes),
         slave,
     )
-    return groups.nodes(f"{slave} tied", nodes[found], words="nodes")
+    return groups.nodes(f"{slave} tied", nodes[found], words="nodes"), tolerance
 
 
-def reached(x: Array, facets: Array, tolerance: float | None) -> Bools:
+def _size(facets: Array) -> float:
+    """Median edge of facets, length; as that of the surfaces of interfaces."""
+    corners = facets[:, [0, 1, 3, 2]] if facets.shape[1] == 4 else facets
+    return float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1)))
+
+
+def reached(x: Array, facets: Array, tolerance: float) -> Bools:
     """Which positions lie within a tolerance of some facets.
 
     Args:
         x: Positions, shape (n, 3), length.
-        facets: Corners of the facets, shape (n_facets, 2 to 4, 3), length.
-        tolerance: Length; a tenth of the facets' size by default.
+        facets: Corners of the facets in the order of rows of facets, where the last corner of four
+            lies across from the first, shape (n_facets, 2 to 4, 3), length.
+        tolerance: Length.
 
     Returns:
         Shape (n,).
     """
-    size = float(np.linalg.norm(np.ptp(facets, axis=1), axis=1).mean())
     k = facets.shape[1]
+    tolerance = (1.0 + _ROUND_OFF) * tolerance
     if k == 2:  # lines, as triangles without area
         triangles = facets[:, [0, 1, 1]]
     elif k == 3:
         triangles = facets
     else:
-        triangles = np.concatenate([facets[:, [0, 1, 2]], facets[:, [0, 2, 3]]])
-    tree = cKDTree(triangles.mean(axis=1))
-    _, near = tree.query(x, k=min(_NEIGHBOURS, len(triangles)))
-    near = near.reshape(len(x), -1)
-    distance = np.full(len(x), np.inf)
-    for column in near.T:
-        distance = np.minimum(distance, _distance(x, triangles[column]))
-    return np.asarray(distance <= (_REACH * size if tolerance is None else tolerance))
+        triangles = np.concatenate([facets[:, [0, 1, 2]], facets[:, [1, 3, 2]]])
+    centre = triangles.mean(axis=1)
+    radius = np.linalg.norm(triangles - centre[:, None], axis=-1).max(axis=1)
+    tree = cKDTree(x)
+    out = np.zeros(len(x), dtype=bool)
+    for first in range(0, len(triangles), _TOGETHER):
+        part = slice(first, first + _TOGETHER)
+        # all that a triangle may reach: among the nearest centres that of a large one may lack
+        near = tree.query_ball_point(centre[part], radius[part] + tolerance)
+        which = np.repeat(np.arange(len(near)), [len(found) for found in near])
+        at = np.concatenate([np.zeros(0), *near]).astype(np.int64)
+        out[at[_distance(x[at], triangles[part][which]) <= tolerance]] = True
+    return out
 
 
 def _distance(x: Array, triangles: Array) -> Array:

@@ -100,7 +100,10 @@ class InterfaceLines:
                 out += self._body.named_surface(name, face)
         whole = not debonds and not interface.contact and not interface.is_rigid
         if whole and pair.bonded[pair.paired].all():
-            return [*out, f'*TIE, NAME="{title}"{_type(interface)}', f'"{slave}", "{master}"']
+            reach = interface.tolerance
+            within = "" if reach is None else f", POSITION TOLERANCE={number(float(reach))}"
+            head = f'*TIE, NAME="{title}"{within}{_type(interface)}'
+            return [*out, head, f'"{slave}", "{master}"']
         if not interface.contact:
             log.warn(
                 "write_deck: interface '%s' has no contact, but open faces of a deck touch", title

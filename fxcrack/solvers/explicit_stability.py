@@ -170,10 +170,10 @@ class Stability:
         viscosity, continuum = self._further.viscosity, self._bodies.continuum
         assert viscosity is not None
         factor = viscosity.quadratic**2 * dt
-        by_node = continuum.layout.by_node(velocity)[:, : continuum.gdim]
-        ends = np.concatenate(
-            [by_node.max(axis=0, initial=-np.inf), -by_node.min(axis=0, initial=np.inf)]
-        )
+        # component by component: several times as fast as along the first axis of few columns
+        components = continuum.layout.by_node(velocity).T[: continuum.gdim]
+        most_of = [c.max(initial=-np.inf) for c in components]
+        ends = np.array(most_of + [-c.min(initial=np.inf) for c in components])
         continuum.comm.Allreduce(MPI.IN_PLACE, ends, op=MPI.MAX)
         width = float(np.linalg.norm(ends[: continuum.gdim] + ends[continuum.gdim :]))
         most = factor * width * viscosity.rate_of_range
