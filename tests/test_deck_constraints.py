@@ -7,7 +7,7 @@ import pytest
 
 import fxcrack as fx
 from fxcrack.deck.cards import DeckError
-from tests.decks import read, write
+from tests.decks import write
 
 LENGTH, E = 10.0, 1000.0
 BEAM = """*NODE
@@ -205,10 +205,3 @@ def test_constraints_inside_parts(tmp_path):
 def test_constraints_that_are_refused(tmp_path, text, words):
     with pytest.raises(DeckError, match=words):
         fx.read_deck(write(tmp_path, BEAM + text)).run(progress=False)
-
-
-def test_not_in_explicit_dynamics(tmp_path):
-    text = BEAM.replace("1000., 0.", "1000., 0.\n*DENSITY\n1.") + KINEMATIC
-    step = "*STEP\n*DYNAMIC, EXPLICIT\n, 1e-3\n*CLOAD\nREF, 1, 1.\n*END STEP\n"
-    with pytest.raises(DeckError, match="not available in explicit dynamics"):
-        read(tmp_path, text + step)

@@ -47,7 +47,7 @@ def distributed(card: Card, cells: Ints, width: int, placed: Placed, flat: Flat)
         DeckError: A cell has no value, or a line is not complete.
     """
     values = np.full((len(flat.cells), width), np.nan)
-    if any(c.isalpha() for line in card.lines for c in line if c not in "eEdD"):
+    if any(to_float(c) is None for line in card.lines for c in line.split(",") if c.strip()):
         for row in card.rows():
             numbers = [row.number(1 + i) for i in range(width)]
             if not row.text(0):

@@ -86,8 +86,10 @@ class MotionCheckpoints:
             if self._finite:
                 self._moving.restore(arrays)
                 looked = files.scatter(arrays["looked"])
-            highest, damped = (files.scatter(arrays[k]) for k in ("highest", "most_damped"))
-            stable, compressed = arrays["stable"].astype(float).tolist()
+            highest = files.scatter(arrays["highest"])
+            # not in files written before increments followed quadratic bulk viscosity
+            damped = files.scatter(arrays.get("most_damped", arrays["highest"]))
+            stable, compressed = [*arrays["stable"].astype(float).ravel().tolist(), 0.0][:2]
             self._stability.restore(highest, stable, looked, damped, compressed)
         return files.snapshot(arrays)
 

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.errors import InputError, unknown_name
+from fxcrack.continuum.loads import Pressure
 from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import AT_ONE
@@ -354,9 +355,10 @@ class OpeningControl:
         values = self._solver.system.monitors(state)[: len(self._weight)]
         first = self._solver.n_loads - len(self._solver.loads)
         more = 0.0
-        titles = [load.title for load in self._solver.loads]
         for fluid in self._solver.fluids:
-            k = titles.index(fluid.pressure.title)
+            title = fluid.pressure.title
+            loads = enumerate(self._solver.loads)
+            k = next(k for k, load in loads if isinstance(load, Pressure) and load.title == title)
             more += float(self._volume[first + k]) * fluid.more_volume()
         return float(self._weight @ values + self._volume @ state.conjugate) + more - self.opening
 

@@ -37,8 +37,9 @@ def warn_of_units(cracks: Sequence[Crack], continuum: Continuum, said: set[str])
     if "units" in said or not moduli:
         return
     for g in cracks:
+        # an evaluator of the user's own may have none, or one of another shape
         toughness = getattr(g.evaluator, "toughness", None)
-        if toughness is None or not np.any(toughness[:, 0] > 0.0):
+        if toughness is None or np.ndim(toughness) != 2 or not np.any(toughness[:, 0] > 0.0):
             continue
         given = float(toughness[:, 0].max())
         size = float(g.front.surface.facet_size)
