@@ -325,7 +325,7 @@ def test_faces_that_slide_surface_to_surface() -> None:
     path = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 0.0, 1.0))
     press = fx.Amplitude((0.0, 1.0), (0.0, 1.0))
     scene = fx.Scene(
-        build(MPI.COMM_SELF, "slider", slider),
+        build(MPI.COMM_SELF, "slider", lambda: slider(11)),
         materials=fx.Isotropic(70e3, 0.3),
         model=fx.PlaneStrain(),
         supports=[

@@ -95,7 +95,7 @@ def solid(comm: MPI.Intracomm) -> fx.Scene:
             fx.Displacement("end_lower", y=-1.0),
         ],
         loads=[fx.Traction("side_w", (0.1, 0.0, -0.3))],
-        debonds=[fx.Debond(bond(4.0), fx.VCCT(GIc=0.2))],
+        debonds=[fx.Debond(bond(4.0), fx.VCCT(GIc=0.2), fx.StepRelease())],
         monitors=[fx.Monitor("mid_top", (0.0, 1.0, 0.0))],
     )
 
