@@ -41,6 +41,9 @@ _ROUND_OFF = 1e-12
 sum A_ii v_i^2: at most 2e-15 where nothing holds a body, nearly incompressible or not; of those
 held 7e-10 or more in slender bodies (900 to 1), 1e-10 in thin ones (50 to 1) that are 1e4 times
 softer than their slaves, 1e-12 where they are 1e7 times softer."""
+_ROUND_OFF_OF_WORK = 1e-15
+"""Of u K u, by the sum of K_ii u_i^2. Bodies that turn as rigid ones have 1e-16 of it,
+a strut 1000 times as long as thick that is bent has 3e-14."""
 
 
 class LinearSolver(InterfaceSolver):
@@ -399,6 +402,17 @@ class LinearSolver(InterfaceSolver):
         right.destroy()
         left.destroy()
         return out
+
+    def round_off_of_work(self, u: Array) -> float:
+        """How large :meth:`elastic_work` may be by round-off alone; collective.
+
+        Args:
+            u: Of the dofs that this rank owns, shape (n_local,), length.
+        """
+        diagonal = self._assembled().getDiagonal()
+        mine = float(np.abs(diagonal.array_r) @ u**2)
+        diagonal.destroy()
+        return _ROUND_OFF_OF_WORK * float(np.sum(self.continuum.comm.allgather(mine)))
 
     def nodal_forces(self, u: PETSc.Vec, state: Equilibrium | None = None) -> PETSc.Vec:
         """Forces of interfaces and supports on the bodies, K u - f.
