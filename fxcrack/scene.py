@@ -47,7 +47,12 @@ from fxcrack.steps.debond import Debond
 from fxcrack.steps.end_conditions import Time
 from fxcrack.steps.energy_check import REFUSED, check_energy
 from fxcrack.steps.explicit import Explicit
-from fxcrack.steps.explicit_rules import check_interfaces, check_start, warn_of_step_release
+from fxcrack.steps.explicit_rules import (
+    check_interfaces,
+    check_start,
+    warn_of_step_release,
+    warn_of_ties,
+)
 from fxcrack.steps.explicit_setup import paired_by_nodes, start_from, use_explicit_solver
 from fxcrack.steps.release_choice import check_friction
 from fxcrack.steps.rows import Observer
@@ -310,6 +315,7 @@ class Scene:
             )
         given = self.input
         check_interfaces(chosen, given.bonds)
+        warn_of_ties(self.pairs[len(given.debonds) :])
         others = [e for e in given.effects if not isinstance(e, Inertia)]
         begins = not isinstance(self.solver, ExplicitSolver)
         if begins and step.start == "equilibrium":

@@ -70,10 +70,15 @@ def refused(tmp_path, text, words):
 
 @pytest.mark.mpi
 @pytest.mark.three
-@pytest.mark.parametrize(("level", "force"), [(0.0, 20.0), (-0.05, 10.0)])
-def test_a_block_pressed_on_a_floor(shared_path, level, force):
+@pytest.mark.parametrize(
+    ("level", "force", "kind"),
+    [(0.0, 20.0, "SURFACE TO SURFACE"), (-0.05, 10.0, "NODE TO SURFACE")],
+)
+def test_a_block_pressed_on_a_floor(shared_path, level, force, kind):
     """E times strain times width: the gap of the floor below is no part of the strain."""
-    deck = fx.read_deck(write(shared_path, profile(f"START, -5., {level}\nLINE, 5., {level}")))
+    text = profile(f"START, -5., {level}\nLINE, 5., {level}")
+    text = text.replace("*CONTACT PAIR,", f"*CONTACT PAIR, TYPE={kind},")
+    deck = fx.read_deck(write(shared_path, text))
     # the strain is the same everywhere: exact but for round-off
     assert deck.run()["R[TOP.y]"][-1] == pytest.approx(-force, rel=1e-10)
     deck.scene.close()

@@ -10,6 +10,7 @@ from specimens import FORCES, HELD_FAR, PINS, bond, grow_to, interface_of, speci
 import fxcrack as fx
 from fxcrack.meshes.dcb import dcb_2d
 from fxcrack.meshes.enf import enf_2d
+from fxcrack.meshes.laminate import laminate_2d
 
 
 def mesh(comm: MPI.Comm) -> fx.Mesh:
@@ -112,6 +113,19 @@ def test_faces_that_pass_through_each_other(
         beam.run(fx.Static(until=fx.Releases(1)))
         assert ("open faces overlap behind the tip at (30, 0, 0)" in caplog.text) != contact
     assert caplog.text.count("overlap") == 1
+
+
+def test_faces_that_move_alike_do_not_overlap(caplog: pytest.LogCaptureFixture) -> None:
+    """A film compressed with its substrate: only round-off is left between the faces."""
+    for push in (-0.3, -0.5, -0.7):  # the sign of a jump of round-off is by chance
+        film = laminate_2d(MPI.COMM_SELF, plies=(2.0, 0.1), crack=1, length=12.0, dx=0.5, order=2)
+        ends = (("end", 0.0), ("far", push))
+        sides = [fx.Displacement(f"{e}_{s}", x=x) for e, x in ends for s in ("upper", "lower")]
+        supports = [*sides, fx.Displacement("bottom", y=0.0)]
+        pressed = specimen(film, a0=3.0, materials=fx.Isotropic(70e3, 0.3), supports=supports)
+        pressed.run(fx.Static(until=fx.Time(1.0)), progress=False)
+        assert "overlap" not in caplog.text
+        pressed.close()
 
 
 def test_loads_of_the_wrong_sign(comm: MPI.Comm, caplog: pytest.LogCaptureFixture) -> None:

@@ -112,6 +112,18 @@ def front_of(scene: fx.Scene, dx: float = 1.0) -> tuple[fx.FrontLine, np.ndarray
     return line, line.x[:, 0] + scene.fatigue.ligaments[0].part[line.node] * dx
 
 
+def test_a_front_in_3d_whose_nodes_jump_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+    """Once; not where the front grows in part, nor where it is one element wide."""
+    for dy, partial in ((2.5, True), (10.0, False), (2.5, False)):
+        assert "jump one after" not in caplog.text
+        scene = wide(MPI.COMM_SELF, dy, dx=2.0, partial=partial)
+        for n in (1, 2):
+            step = fx.Cycles(maximum=0.3, ratio=0.1, until=fx.Releases(n))
+            scene.run(step, progress=False)
+        scene.close()
+    assert caplog.text.count("jump one after") == 1
+
+
 @pytest.mark.slow
 def test_a_front_is_smooth_and_its_life_does_not_depend_on_the_width_of_elements() -> None:
     life = []

@@ -372,7 +372,8 @@ class Contacts:
             contact=not card.has("TIED"),
             friction=friction,
             normal_only=pair.normal_only,
-            pairing=pairing_of(card),
+            # a rigid surface has no facets: nodes and surfaces meet it in the same way
+            pairing=None if self._rigid.has(pair.row) else pairing_of(card),
             gap=gap,
             tolerance=tolerance,
             name=pair.title,

@@ -74,8 +74,8 @@ def second_order_effects(solver: LinearSolver, displacement: Array) -> SecondOrd
     correction = -solver.response(right)
     (relaxed,) = dots([(correction, -right)])
     strained = solver.elastic_work(displacement)
-    if not strained > 0.0:
-        return SecondOrderEffects(0.0, 0.0)
+    if not strained > solver.round_off_of_work(displacement):
+        return SecondOrderEffects(0.0, 0.0)  # the bodies move as rigid ones, and bear nothing
     eta = (3.0 * found.third + 4.0 * (found.fourth - 0.5 * relaxed)) / strained
     vectors: list[Array] = []
     forces: list[Array] = []  # K x
@@ -148,12 +148,12 @@ def warn_of_second_order(solver: LinearSolver, displacement: Array, said: set[st
         )
     if found.buckling > LARGE and "buckling" not in said:
         said.add("buckling")
+        grows = f"deflections are larger by the factor 1/(1 - {found.buckling:.2g}) at least"
         log.warn(
             "compression has reached %.2g of the load at which the linear bodies would buckle, or "
-            "more: what deflects there deflects by 1/(1 - %.2g) times as much, and buckling does "
-            "not show; give the Scene effects=[FiniteStrain()]",
+            "more: %s, which linear bodies do not show; give the Scene effects=[FiniteStrain()]",
             found.buckling,
-            min(found.buckling, 1.0),
+            grows if found.buckling < 1.0 else "the bodies have buckled",
         )
 
 

@@ -149,6 +149,9 @@ class Crack:
         if not self._may_overlap or not len(tips):
             return
         behind = openings(self.probe, tips, state)
+        force = np.abs(self.probe.bond_forces(tips.force_nodes, state)).max(axis=-1)
+        noise = self.probe.round_off(tips.force_nodes, state)
+        behind = np.where((force > noise).any(axis=1)[:, None, None], behind, 0.0)
         size = float(np.abs(behind).max())
         if size < max(1e-12 * self.front.surface.facet_size, 1e-9 * np.abs(state.jump).max()):
             return  # round-off

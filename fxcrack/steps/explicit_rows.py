@@ -104,14 +104,16 @@ def explicit_row(
 def spent_per_area(solver: ExplicitSolver, crack: Crack) -> float:
     """Energy that the bonds of a crack have really taken, over the area swept, force/length.
 
-    Of bonds that softened and are free; 0 before the first of them.
+    Of bonds that softened and are free; 0 before the first of them. On a plane of symmetry that of
+    the whole crack, as rates are.
     """
     rows, bonds = solver.row_of[crack.p], solver.dynamics.bonds
     nodes = np.flatnonzero(rows >= 0)
     nodes = nodes[bonds.freed[rows[nodes]]]
     if not len(nodes):
         return 0.0
-    return float(bonds.spent[rows[nodes]].sum() / bonds.area[rows[nodes]].sum())
+    rate = float(bonds.spent[rows[nodes]].sum() / bonds.area[rows[nodes]].sum())
+    return rate * crack.probe.pair.interface.opening_factor
 
 
 def imbalance(row: Row) -> float:

@@ -15,6 +15,7 @@ from fxcrack.continuum.term import Term
 from fxcrack.criteria import VCCT
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.definition import Interface
+from fxcrack.interface.pair import Pair
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.release_choice import explicit_law
 
@@ -189,12 +190,16 @@ def check_interfaces(debonds: Sequence[Debond], bonds: Sequence[Interface]) -> N
                 f"interface '{interface.title}': surface-to-surface weights would give lumped "
                 "masses of masters below zero; leave pairing out in explicit dynamics"
             )
-    for interface in bonds:
-        if interface.bonded is not None:
+
+
+def warn_of_ties(bonds: Sequence[Pair]) -> None:
+    """Warn where bonds of a given set have no criterion; a set may mark no node at all."""
+    for pair in bonds:
+        if pair.interface.bonded is not None and pair.bonded.any():
             log.warn(
                 "interface '%s' has a bonded set but no criterion: its bonds stay tied whatever "
                 "they carry; make it a Debond if they may fail",
-                interface.title,
+                pair.title,
             )
 
 
@@ -212,4 +217,11 @@ def warn_of_step_release(debonds: Sequence[Debond]) -> None:
             )
 
 
-__all__ = ["check_bodies", "check_interfaces", "check_start", "inertia_of", "warn_of_step_release"]
+__all__ = [
+    "check_bodies",
+    "check_interfaces",
+    "check_start",
+    "inertia_of",
+    "warn_of_step_release",
+    "warn_of_ties",
+]

@@ -3,7 +3,8 @@
 fxcrack has no units: lengths, forces and what follows from them must be of one system. Moduli in Pa
 beside lengths in mm make bodies a million times too stiff and loads of growth a thousand times too
 large, without any other sign. At growth the strain beside a crack tip is about the square root of
-G_c/(E l), l the length of an element there: 1e-3 to 1e-1 in what breaks by delamination.
+G_c/(E l), l the length of an element there: 1e-3 to 1e-1 in what breaks by delamination. E is that
+of the softest body, as a tool or a substrate may be made as stiff as one likes.
 """
 
 from __future__ import annotations
@@ -43,17 +44,17 @@ def warn_of_units(cracks: Sequence[Crack], continuum: Continuum, said: set[str])
             continue
         given = float(toughness[:, 0].max())
         size = float(g.front.surface.facet_size)
-        ratio = given / (max(moduli) * size)
+        ratio = given / (min(moduli) * size)
         if ratio < _TOO_SMALL:
             said.add("units")
             log.warn(
-                "interface '%s': toughness %.3g, moduli up to %.3g and elements %.3g long let the "
-                "bodies strain by about %.1g at growth, far less than any material; are they of "
-                "one system of units? With lengths in mm and forces in N moduli are in MPa and "
+                "interface '%s': toughness %.3g, moduli from %.3g on and elements %.3g long let "
+                "the bodies strain by about %.1g at growth, far less than any material; are they "
+                "of one system of units? With lengths in mm and forces in N moduli are in MPa and "
                 "toughness is in N/mm; with m and N in Pa and J/m^2",
                 g.title,
                 given,
-                max(moduli),
+                min(moduli),
                 size,
                 np.sqrt(ratio),
             )
