@@ -29,15 +29,16 @@ _AT_ONE = 1e-9
 _NEAR_ONE = 1e-7
 """How near to 1 the iteration's own tolerance may leave f, where it no longer comes nearer."""
 _MANY = 30
-"""Increments of no length after which f is said to stay where it is."""
+"""Increments of next to no length after which f is said to stay where it is."""
 _MOST = 60
 """Trials in which the controlled opening must be found; halving to round-off needs 53."""
 _RESOLVED = 1e-13
 """Part of the time below which a bracket is not divided: f jumps over 1 there."""
-_NO_PROGRESS = 4e-16
-"""Increments below this part of the time are round-off."""
+_NO_PROGRESS = 1e-7
+"""Increments below this part of the time, one after the other, do not lead on."""
 _NUDGE = 1e-12
-"""Part of the time by which the load goes on where increments of no length leave f below 1."""
+"""Part of the time by which the load goes on where increments of next to no length leave f below
+1; twice as much with each of them."""
 _SMALLEST = 1e-6
 """Smallest increment, as a part of the whole, before the search is given up."""
 
