@@ -108,21 +108,26 @@ class FrontLine:
         """Directions of growth: those of the tips, but normal to the segments beside them.
 
         Where cells are irregular the former are several degrees off, which would move the front
-        along itself. Shape (n_tips, 3).
+        along itself. At kinks, where a tip moves along a segment beside it, the side that all of a
+        line grows to tells the sign of both segments; one by one they could sum up to a direction
+        along the front, in which it opens no area. Shape (n_tips, 3).
 
         Args:
             tips: Front nodes.
         """
         out = tips.frame[:, :, 1].copy()
-        if self.dim == 1:
+        if self.dim == 1 or not len(self.segments):
             return out
+        ends = self.segments
+        chord = (self.x[ends[:, 1]] - self.x[ends[:, 0]])[:, None]
+        across = np.cross(tips.frame[ends, :, 0], chord)
+        line = np.concatenate([[0], np.cumsum(ends[1:, 0] != ends[:-1, 1])])
+        votes = np.bincount(line, weights=np.einsum("kec,kec->k", across, out[ends]))
+        across *= np.where(votes < 0.0, -1.0, 1.0)[line][:, None, None]
         total = np.zeros_like(out)
-        for a, b in self.segments:
-            for tip in (a, b):
-                across = np.cross(tips.frame[tip, :, 0], self.x[b] - self.x[a])
-                total[tip] += across if across @ out[tip] > 0.0 else -across
+        np.add.at(total, ends, across)
         size = np.linalg.norm(total, axis=1)
-        known = size > 0.0
+        known = size > _NOTHING * np.abs(chord).max()
         out[known] = total[known] / size[known, None]
         return out
 
