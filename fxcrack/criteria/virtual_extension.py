@@ -96,6 +96,27 @@ class FrontLine:
         ends = self.x[self.segments]
         return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
+    def ends(self) -> Ints:
+        """Tips at which lines end, also those of lines of a single tip."""
+        passed = np.bincount(self.segments.ravel(), minlength=len(self.x))
+        single = self.segments[self.segments[:, 0] == self.segments[:, 1], 0]
+        return np.union1d(np.flatnonzero(passed == 1), single)
+
+    def spans(self) -> Array:
+        """Angles between the first and the last segment of each open line [degrees]."""
+        tips = self.segments
+        if not len(tips):
+            return np.zeros(0)
+        first = np.flatnonzero(np.append(True, tips[1:, 0] != tips[:-1, 1]))
+        last = np.append(first[1:], len(tips)) - 1
+        chord = self.x[tips[:, 1]] - self.x[tips[:, 0]]
+        out = []
+        for one, two in zip(first.tolist(), last.tolist(), strict=True):
+            if tips[one, 0] != tips[two, 1]:
+                across = float(np.linalg.norm(np.cross(chord[one], chord[two])))
+                out.append(float(np.degrees(np.arctan2(across, float(chord[one] @ chord[two])))))
+        return np.array(out)
+
     def inward(self, i: int) -> int:
         """The tip beside one at the end of the front; any other tip itself."""
         mine = self.segments[(self.segments == i).any(axis=1)]
