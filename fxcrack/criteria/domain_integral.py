@@ -41,7 +41,7 @@ _ROUGH = {
     "in bending up to 17 %%; take method='vcct'",
     2: "interface '%s': method='domain' on second-order tetrahedra along a front that ends on free "
     "faces, is straight or turns sharply: G of single nodes is off by up to 20 %%, more at kinks "
-    "and free edges, and the mean of a front is 1 %% short in bending and 5 to 10 %% at 4 elements "
+    "and free edges, and the mean of a front is 2 %% short in bending and 5 to 10 %% at 4 elements "
     "per radius; take method='vcct'",
 }
 """Warnings where rates of single nodes stay as they are, by the order of the tetrahedra."""
