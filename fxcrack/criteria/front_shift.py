@@ -82,7 +82,8 @@ class NextFront:
             simplices: Whether the cells are triangles or tetrahedra.
             order: Order of their displacement.
             length: Length of the front through tetrahedra, where the next one is not as smooth as
-                the present one and means of both are compared; ``None``: node by node.
+                the present one and means of both are compared; ``None``, and 0 of single tips:
+                node by node.
         """
         moves = (tips.d_ahead > 0.0) & ~tips.ligament
         opened = np.unique(tips.force_nodes[moves])
@@ -96,7 +97,7 @@ class NextFront:
         aim = surface.x[tips.node] + tips.d_ahead[:, None] * tips.frame[:, :, 1]
         away = np.linalg.norm(aim[:, None] - surface.x[later.node], axis=2)
         match = away.argmin(axis=1)
-        if length is not None:
+        if length is not None and length > 0.0:
             n = len(tips)
             size = np.full(n, 0.5 * float(np.mean(tips.d_ahead + tips.d_behind)))
             step = np.full(n, _area(surface, after.bonded, front.bonded) / length)

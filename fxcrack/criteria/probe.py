@@ -104,6 +104,17 @@ class Bodies(Protocol):
         """
         ...
 
+    def held(self, nodes: Ints) -> Bools:
+        """Which components supports prescribe at global nodes, the same on all ranks; collective.
+
+        Args:
+            nodes: Global displacement nodes, sorted, shape (n,).
+
+        Returns:
+            Shape (n, gdim).
+        """
+        ...
+
     def load_factors(self, state: State) -> Array:
         """Factors of the force patterns, shape (n_loads,)."""
         ...

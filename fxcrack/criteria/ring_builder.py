@@ -18,6 +18,7 @@ from fxcrack.continuum.loads import BodyForce
 from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt_strain
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import FaceTractions, loads_on_faces, opened_facets
+from fxcrack.criteria.front_ends import on_planes_of_symmetry
 from fxcrack.criteria.front_ring import FIELDS_DEGREE, CellGeometry, TipState, divergence_in_rings
 from fxcrack.criteria.front_smoothing import smoothing
 from fxcrack.criteria.outer_faces import node_positions, outer_faces
@@ -31,9 +32,12 @@ from fxcrack.interface.tips import Tips
 
 _OPENING = 1
 """Place of mode I among the fields of a tip."""
-_STRAIGHT = 30.0
+_STRAIGHT = 30.001
 """Turn of the front from one element to the next above which single nodes are not reliable
-[degrees]; a circle has 15 with 24 elements around it."""
+[degrees]; a circle has 15 with 24 elements around it, and 30 up to round-off with 12."""
+_CURVED = 45.0
+"""Turn between planes of symmetry below which a front is as good as straight [degrees]; a quarter
+of a circle has 60 with three elements."""
 
 
 @dataclass(frozen=True)
@@ -125,10 +129,7 @@ class RingBuilder:
         if not len(opened):
             self._look_at_turning(line)
         x = surface.x[tips.node]
-        here = []
-        for node in tips.node:
-            masters = pair.masters[node][np.abs(pair.weights[node]) > 1e-9]
-            here.append(np.unique(np.append(masters, surface.dofs[node])))
+        here = self._nodes_at(front, tips.node)
         tangent = tips.frame[:, :gdim, 2] if gdim == 3 else np.zeros((len(tips), 2))
         size = self._cells.sizes(here, x[:, :gdim], tangent)
         size = np.maximum(size, np.maximum(tips.d_behind, tips.d_ahead))
@@ -138,16 +139,20 @@ class RingBuilder:
         cells = self._cells.near(x[:, :gdim], np.full(len(x), wide))
         corners = Corners(cells, line)
         weights = None
-        if ahead is not None:
+        if cells.kind == "tetrahedron":
             along = corners.allowed(surface.dofs[tips.node], line.directions(tips))
             tips = replace(tips, frame=_turned(tips.frame, along))
+        if ahead is not None:
             areas = np.array([line.widths(tips, i) for i in range(len(tips))])
             weights = smoothing(line.x, line.segments, areas)
             # nodes about to open change what their rings need
             opened, reach = ahead, np.inf
         rings, known = [], {}
         for i in range(len(tips)):
-            key = self._key(front, tips, i, wide + reach, float(size[i]), opened)
+            key = (
+                weights is not None,
+                *self._key(front, tips, i, wide + reach, float(size[i]), opened),
+            )
             ring = self._known.get(key)
             if ring is None:
                 row = None if weights is None else weights[i] * areas[i] / areas
@@ -158,6 +163,37 @@ class RingBuilder:
             rings.append(ring)
         self._fresh = known
         return rings
+
+    def is_smooth(self, front: Front, tips: Tips) -> bool:
+        """Whether rates may be smooth along a front of tetrahedra; collective.
+
+        What corrects them was found and verified on fronts whose lines are closed or curved from
+        one plane of symmetry to another, without sharp turns.
+
+        Args:
+            front: The front where the bodies are undeformed.
+            tips: Its nodes there.
+        """
+        line = FrontLine.of(front, tips)
+        ends = line.ends()
+        real = line.segments[:, 0] != line.segments[:, 1]
+        if not len(real) or not real.all() or line.turning()[0] > _STRAIGHT:
+            return False
+        if not len(ends):
+            return True
+        if line.spans().min(initial=np.inf) < _CURVED:
+            return False
+        here = self._nodes_at(front, tips.node[ends])
+        cells = self._cells.near(line.x[ends, : self._probe.gdim], np.zeros(len(ends)))
+        return on_planes_of_symmetry(here, cells, self._own_facets(cells), self._bodies.held)
+
+    def _nodes_at(self, front: Front, nodes: Ints) -> list[Ints]:
+        """Global displacement nodes of both sides that lie at slave nodes."""
+        pair, out = self._probe.pair, []
+        for node in nodes:
+            masters = pair.masters[node][np.abs(pair.weights[node]) > 1e-9]
+            out.append(np.unique(np.append(masters, front.surface.dofs[node])))
+        return out
 
     def keep(self, rings: dict[tuple[Any, ...], Ring]) -> None:
         """Keep these rings for later fronts, and no others."""

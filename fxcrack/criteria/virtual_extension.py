@@ -96,6 +96,27 @@ class FrontLine:
         ends = self.x[self.segments]
         return float(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1).sum())
 
+    def ends(self) -> Ints:
+        """Tips at which lines end, also those of lines of a single tip."""
+        passed = np.bincount(self.segments.ravel(), minlength=len(self.x))
+        single = self.segments[self.segments[:, 0] == self.segments[:, 1], 0]
+        return np.union1d(np.flatnonzero(passed == 1), single)
+
+    def spans(self) -> Array:
+        """Angles between the first and the last segment of each open line [degrees]."""
+        tips = self.segments
+        if not len(tips):
+            return np.zeros(0)
+        first = np.flatnonzero(np.append(True, tips[1:, 0] != tips[:-1, 1]))
+        last = np.append(first[1:], len(tips)) - 1
+        chord = self.x[tips[:, 1]] - self.x[tips[:, 0]]
+        out = []
+        for one, two in zip(first.tolist(), last.tolist(), strict=True):
+            if tips[one, 0] != tips[two, 1]:
+                across = float(np.linalg.norm(np.cross(chord[one], chord[two])))
+                out.append(float(np.degrees(np.arctan2(across, float(chord[one] @ chord[two])))))
+        return np.array(out)
+
     def inward(self, i: int) -> int:
         """The tip beside one at the end of the front; any other tip itself."""
         mine = self.segments[(self.segments == i).any(axis=1)]
@@ -108,21 +129,26 @@ class FrontLine:
         """Directions of growth: those of the tips, but normal to the segments beside them.
 
         Where cells are irregular the former are several degrees off, which would move the front
-        along itself. Shape (n_tips, 3).
+        along itself. At kinks, where a tip moves along a segment beside it, the side that all of a
+        line grows to tells the sign of both segments; one by one they could sum up to a direction
+        along the front, in which it opens no area. Shape (n_tips, 3).
 
         Args:
             tips: Front nodes.
         """
         out = tips.frame[:, :, 1].copy()
-        if self.dim == 1:
+        if self.dim == 1 or not len(self.segments):
             return out
+        ends = self.segments
+        chord = (self.x[ends[:, 1]] - self.x[ends[:, 0]])[:, None]
+        across = np.cross(tips.frame[ends, :, 0], chord)
+        line = np.concatenate([[0], np.cumsum(ends[1:, 0] != ends[:-1, 1])])
+        votes = np.bincount(line, weights=np.einsum("kec,kec->k", across, out[ends]))
+        across *= np.where(votes < 0.0, -1.0, 1.0)[line][:, None, None]
         total = np.zeros_like(out)
-        for a, b in self.segments:
-            for tip in (a, b):
-                across = np.cross(tips.frame[tip, :, 0], self.x[b] - self.x[a])
-                total[tip] += across if across @ out[tip] > 0.0 else -across
+        np.add.at(total, ends, across)
         size = np.linalg.norm(total, axis=1)
-        known = size > 0.0
+        known = size > _NOTHING * np.abs(chord).max()
         out[known] = total[known] / size[known, None]
         return out
 

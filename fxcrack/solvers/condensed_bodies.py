@@ -8,7 +8,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.follower_pressure import FollowerPressure
 from fxcrack.continuum.shell_bodies import ShellBodies
@@ -70,13 +70,23 @@ class CondensedBodies:
         change = self._solver.displacement_of_jumps(after.jump - before.jump)
         return self._of_nodes(nodes, change)
 
+    def held(self, nodes: Ints) -> Bools:
+        """Which components supports prescribe at global nodes, (n, gdim); collective."""
+        prescribed = (self._solver.supports.which >= 0).astype(float)
+        return self._gathered(nodes, prescribed) > 0.0
+
     def _of_nodes(self, nodes: Ints, u: PETSc.Vec) -> Array:
         """Values of a vector at global nodes, on all ranks, shape (n, gdim); destroys it."""
+        out = self._gathered(nodes, u.array_r)
+        u.destroy()
+        return out
+
+    def _gathered(self, nodes: Ints, values: Array) -> Array:
+        """Values of the owned dofs at global nodes, on all ranks, shape (n, gdim); collective."""
         layout = self.continuum.layout
         here = layout.is_owned(nodes)
         mine = np.zeros((len(nodes), self.continuum.gdim))
-        mine[here] = layout.displacements(u.array_r)[layout.to_local(nodes[here])]
-        u.destroy()
+        mine[here] = layout.displacements(values)[layout.to_local(nodes[here])]
         out = np.zeros_like(mine)
         self.continuum.comm.Allreduce(mine, out, op=MPI.SUM)
         return out

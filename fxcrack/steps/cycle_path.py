@@ -36,6 +36,8 @@ _HALVINGS = 8
 """How often a piece of the cycle that is no parabola is halved at most."""
 _SAMPLINGS = 6
 """How often each piece of a cycle with friction is halved at most."""
+_NOTHING = 1e-6
+"""Rates below this part of the largest one along the fronts are round-off."""
 _SETTLING = 20
 """Cycles that friction gets to settle."""
 
@@ -106,7 +108,9 @@ class StabilisedCycle:
             fine = [a.towards(b, x) for a, b in pairwise(corners) for x in parts.tolist()]
             way, _ = self._once(way[-1], fine)
             now = self._ranges(way)
-            if np.all(np.abs(now - before) <= self._change * now[1]):
+            # rates of round-off must not ask for more instants
+            size = np.maximum(now[1], _NOTHING * now[1].max(initial=0.0))
+            if np.all(np.abs(now - before) <= self._change * size):
                 return way
             before = now
         N = self._analysis.fatigue.N

@@ -32,9 +32,9 @@ class Debond:
         release: How the bond force goes to zero. By default progressively in 3-D and in
             :class:`fxcrack.Explicit` steps (:class:`ProgressiveRelease`), at once in the plane
             (:class:`StepRelease`); at once in 3-D, too, with criteria that know no toughness, with
-            :class:`Fatigue`, and where progressive release is not possible: beside friction, with
-            ``method="closure"`` or ``"domain"``, with ``stepping="opening"``, with
-            ``unstable_tolerance`` in increments.
+            :class:`Fatigue`, and where progressive release is not possible or of no use: beside
+            friction, with ``method="closure"`` or ``"domain"``, with ``stepping="opening"``, with
+            ``unstable_tolerance`` in static increments.
         temperature: Temperature of the interface, a number or a function of positions of shape
             (3, n), for toughness, strength or critical opening tabulated against it.
         watch: Criteria whose quantities the history reports as well; they do not decide.
