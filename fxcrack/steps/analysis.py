@@ -298,7 +298,7 @@ class Analysis:
                 self.said.add(f"release of {g.title}")
                 log.info(
                     "interface '%s': bonds are released at once (StepRelease); the default in 3-D, "
-                    "progressive release, is not possible with %s",
+                    "progressive release, is not taken with %s",
                     g.title, choice.why_at_once,
                 )  # fmt: skip
         self.active = [g for g in self.cracks if g.debond in chosen]
