@@ -124,7 +124,7 @@ def test_where_it_is_not_possible_it_is_said_once_and_no_error(
         scene.run(step, progress=False)
     history = scene.history
     scene.close()
-    assert caplog.text.count("not possible with stepping='opening'") == 1
+    assert caplog.text.count("not taken with stepping='opening'") == 1
     assert history["released[bond]"][-1] >= 7
     assert np.all(np.diff(history["m[top]"]) >= -1e-9 * history["m[top]"].max())
     assert np.abs(history["balance"]).max() <= 1e-9 * history["external_work"].max()
