@@ -120,7 +120,7 @@ class BodyMotion:
         """
         if self._change is None or self._rows is None:
             return self._bodies.forces().copy()
-        u = self._u
+        u = self._bodies.columns()  # rows may need more nodes than the displacement has
         out = self._change(u)
         if self._first is not None:
             out[self._early] = self._first(u)
