@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base.errors import InputError, unknown_name
-from fxcrack.continuum.loads import Pressure
 from fxcrack.criteria import ProgressiveRelease
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.history import AT_ONE
@@ -314,18 +313,18 @@ class OpeningControl:
         self.opening = 0.0
         titles = [m.title for m in solver.monitors]
         first = solver.n_loads - len(solver.loads)
-        volumes = {x.title: first + k for k, x in enumerate(solver.loads) if _fills(x)}
+        self._volumes = {x.title: first + k for k, x in enumerate(solver.loads) if _fills(x)}
         self._weight = np.zeros(len(titles))
         self._volume = np.zeros(solver.n_loads)
         self._preloaded = False
         for name, sign in zip(names, (1.0, -1.0), strict=False):
             if name in titles:
                 self._weight[titles.index(name)] += sign
-            elif name in volumes:
-                self._volume[volumes[name]] += sign
+            elif name in self._volumes:
+                self._volume[self._volumes[name]] += sign
             else:
                 unknown_name(
-                    "monitor or pressure that follows the crack", name, [*titles, *volumes]
+                    "monitor or pressure that follows the crack", name, [*titles, *self._volumes]
                 )
         if solver.system.friction is not None:
             raise InputError(
@@ -353,13 +352,10 @@ class OpeningControl:
     def excess(self, state: Equilibrium) -> float:
         """What the opening of a state has over that of the last onset, length."""
         values = self._solver.system.monitors(state)[: len(self._weight)]
-        first = self._solver.n_loads - len(self._solver.loads)
-        more = 0.0
-        for fluid in self._solver.fluids:
-            title = fluid.pressure.title
-            loads = enumerate(self._solver.loads)
-            k = next(k for k, load in loads if isinstance(load, Pressure) and load.title == title)
-            more += float(self._volume[first + k]) * fluid.more_volume()
+        more = sum(
+            float(self._volume[self._volumes[fluid.pressure.title]]) * fluid.more_volume()
+            for fluid in self._solver.fluids
+        )
         return float(self._weight @ values + self._volume @ state.conjugate) + more - self.opening
 
     def reach(self, state: Equilibrium) -> None:
