@@ -36,6 +36,8 @@ _RESOLVED = 1e-13
 """Part of the time below which a bracket is not divided: f jumps over 1 there."""
 _NO_PROGRESS = 1e-7
 """Increments below this part of the time, one after the other, do not lead on."""
+_ROUND_OFF = 4e-16
+"""Increments below this part of the time are round-off; those in a bracket may be short."""
 _NUDGE = 1e-12
 """Part of the time by which the load goes on where increments of next to no length leave f below
 1; twice as much with each of them."""
@@ -158,8 +160,13 @@ class NewtonLoadPath:
                 return True  # nearer than the iteration can resolve
             if guess == target:
                 return False
-            idle = idle + 1 if abs(guess - begin) <= _NO_PROGRESS * abs(begin) else 0
-            if idle or jumps:
+            short = _NO_PROGRESS if beyond is None else _ROUND_OFF
+            still = abs(guess - begin) <= short * abs(begin)
+            if still:
+                idle += 1
+            elif beyond is None:
+                idle = 0
+            if still or jumps:
                 beyond = bracket = None
             if idle > _MANY:
                 raise TooManyCutbacks(f"f stays at {level:.9g} where it should reach 1")
