@@ -337,6 +337,8 @@ OTHER_RANKS = (
 """Runs that are restarted on another number of ranks."""
 
 SHORTER = {
+    "finite strain, event, turning load": fx.Time(0.8),
+    "plastic, short": fx.Releases(2),
     "finite strain, increments, friction": fx.Time(1.4),
     "pressure that follows, temperature": fx.Time(0.55),
     "inertia, finite strain": fx.Time(1.0),
