@@ -24,6 +24,7 @@ except ImportError:  # it may move: the public product, which costs more for sma
         """Add A x to y."""
         y += sp.csr_matrix((data, columns, starts), shape=(n, m)) @ x
 
+
 _ON_ONE_THREAD = 8192
 """Entries of a vector that OpenBLAS does not share among threads: to wake one takes longer than the
 sum itself, and threads that wait for the next one take the cores of other processes."""
