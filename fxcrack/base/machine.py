@@ -55,7 +55,7 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
-def threads_share_cores(comm: MPI.Intracomm) -> str:
+def threads_share_cores(comm: MPI.Comm) -> str:
     """Why ranks wait for each other's threads of linear algebra, in words; "" if they do not.
 
     OpenBLAS and MKL start as many threads as a process may use cores, unless the environment
