@@ -3,7 +3,7 @@
 End-notched flexure under a given force: G_II = 9 P^2 (a + 0.42 chi h)^2/(16 b^2 E' h^3), corrected
 beam theory (Wang and Williams 1992; chi = 0.663 in plane strain at nu = 0.3). The converged
 solution of the specimen is 0.989 of it. Penny-shaped crack under tension: Sneddon (1946), under
-shear: Segedin (1951). Elliptical crack: Irwin (1962). Crack along an arc: Cotterell and Rice (1980).
+shear: Segedin (1951). Elliptical crack: Irwin (1962). Along an arc: Cotterell and Rice (1980).
 """
 
 from __future__ import annotations

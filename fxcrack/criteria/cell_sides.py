@@ -12,6 +12,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from fxcrack.base.arrays import Array, Bools, Ints
+from fxcrack.criteria.outer_faces import node_positions
 from fxcrack.interface.front_cells import FrontCells
 
 
@@ -46,22 +47,25 @@ def cells_above(cells: FrontCells, slaves: Ints, masters: Ints) -> tuple[Bools, 
         side[fresh] = np.sign(votes[fresh])
 
 
-def curved_faces(
-    x: Array, corners: Array, normal: Array, origin: Array, *, own: Bools, opened: Bools
-) -> Bools:
-    """Facets of the open crack that lie off the tangent plane of a tip, shape (n_cells, n_facets).
+def free_facets(cells: FrontCells, own: Bools, held: Ints, normal: Array, origin: Array) -> Bools:
+    """Free facets that the fields of a tip may load, shape (n_cells, n_facets).
+
+    Those of the interface count where it is open and lies off the tangent plane at the tip, in
+    which the fields are free of tractions.
 
     Args:
-        x: Positions of the displacement nodes of the cells, shape (n_cells, n_nodes, 3) [length].
-        corners: Nodes of each facet within a cell, shape (n_facets, k).
+        cells: The cells.
+        own: Whether each facet is one of the interface, shape (n_cells, n_facets).
+        held: Global displacement nodes of both sides that are bonded, shape (n,).
         normal: Of the interface at the tip, shape (3,).
         origin: The tip, shape (3,) [length].
-        own: Whether each facet is one of the interface, shape (n_cells, n_facets).
-        opened: Whether it has a node that is not bonded, likewise.
     """
-    height = np.abs((x - origin) @ normal)[:, corners].max(axis=2)
-    size = np.ptp(x[:, corners], axis=2).max(axis=2)
-    return np.asarray(own & opened & (height > _FLAT * size))
+    corners = cells.facet_corners
+    x = node_positions(cells)[:, corners]
+    height = np.abs((x - origin) @ normal).max(axis=2)
+    flat = height < _FLAT * np.ptp(x, axis=2).max(axis=2)
+    tied = np.isin(cells.nodes[:, corners], held).all(axis=2)
+    return np.asarray(cells.outer & ~(own & (flat | tied)))
 
 
 _FLAT = 1e-6

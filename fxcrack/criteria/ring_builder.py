@@ -16,7 +16,7 @@ from fxcrack.continuum.face import Face
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.continuum.loads import BodyForce
 from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt_strain
-from fxcrack.criteria.cell_sides import cells_above, curved_faces
+from fxcrack.criteria.cell_sides import cells_above, free_facets
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import FaceTractions, loads_on_faces, opened_facets
 from fxcrack.criteria.front_ends import on_planes_of_symmetry
@@ -68,6 +68,11 @@ class _Place:
     opened: Ints
     weights: Array | None
     step: float
+
+    @property
+    def normal(self) -> Array:
+        """Normal of the interface where the modes are found, shape (3,)."""
+        return self.tips.frame[self.modes, :, 0]
 
 
 class RingBuilder:
@@ -396,8 +401,9 @@ class RingBuilder:
         by_node = np.zeros((m, n_nodes, gdim))
         each = geometry.weights_at_nodes(modes)
         each += outer_faces(
-            cells, geometry, q, self._free_facets(at, cells, origin), fields, origin, above,
-            stiffness, m, thickness,
+            cells, geometry, q,
+            free_facets(cells, self._own_facets(cells), self._held(at.front), at.normal, origin),
+            fields, origin, above, stiffness, m, thickness,
         )  # fmt: skip
         for mode in range(m):
             np.add.at(by_node[mode], of_cell, each[mode])
@@ -408,27 +414,18 @@ class RingBuilder:
                 weights[np.arange(m) != _OPENING] = 0.0
         return Interaction(by_node, by_rise, by_load, energy, fields.oscillation)
 
+    def _held(self, front: Front) -> Ints:
+        """Global displacement nodes of both sides that are bonded, shape (n,)."""
+        masters = [self._probe.pair.masters[k] for k in np.flatnonzero(front.bonded)]
+        slaves = front.surface.dofs[front.bonded]
+        return np.concatenate([slaves, *masters]) if len(self._masters) else slaves
+
     def _own_facets(self, cells: FrontCells) -> Bools:
         """Whether each facet of a cell is one of the interface, shape (n_cells, n_facets)."""
         corners = cells.nodes[:, cells.facet_corners]
         return np.asarray(
             np.isin(corners, self._slaves).all(axis=2) | np.isin(corners, self._masters).all(axis=2)
         )
-
-    def _free_facets(self, at: _Place, cells: FrontCells, origin: Array) -> Bools:
-        """Free facets that the fields of a tip load, shape (n_cells, n_facets)."""
-        own = self._own_facets(cells)
-        bonded, surface = at.front.bonded, at.front.surface
-        pair = self._probe.pair
-        held = [surface.dofs[bonded]]
-        if len(self._masters):
-            held += [np.concatenate([pair.masters[k] for k in np.flatnonzero(bonded)])]
-        opened = ~np.isin(cells.nodes[:, cells.facet_corners], np.concatenate(held)).all(axis=2)
-        normal = at.tips.frame[at.modes, :, 0]
-        curved = curved_faces(
-            node_positions(cells), cells.facet_corners, normal, origin, own=own, opened=opened
-        )
-        return np.asarray(cells.outer & (~own | curved))
 
     def _temperatures(
         self, cells: FrontCells, geometry: CellGeometry, shift: Array
