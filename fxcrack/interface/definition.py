@@ -46,7 +46,8 @@ class Interface:
             ``Pair.surface``), or ``None``: all of them, and no tip exists.
         contact: Open faces cannot pass through each other (unilateral).
         friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
-            a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.
+            a function of positions of shape (3, n) that returns n numbers. ``None``, or 0
+            everywhere: no friction.
         normal_only: Bonds hold the opening only and let the faces slip.
         symmetry: The master is a plane of symmetry (:class:`fxcrack.RigidPlane`), and the scene
             models one half of the body. Bonds hold the opening only, as with ``normal_only``.
