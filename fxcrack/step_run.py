@@ -177,7 +177,7 @@ def _warn_of_displacement(analysis: Analysis) -> None:
     # not worth a factorisation of its own, which a direct solver needs on several ranks
     linear = isinstance(solver, LinearSolver) and solver.recovers_displacement
     plastic = any(getattr(m, "form", "") == "plastic" for m in continuum.part_materials)
-    constraints = solver.supports.constraints if is_finite(continuum, analysis.effects) else []
+    constraints = solver.supports.constraints if is_finite(continuum, analysis.effects) else ()
     if not (linear or plastic or constraints):
         return
     u = solver.displacement()
