@@ -149,6 +149,8 @@ class Crack:
         if not self._may_overlap or not len(tips):
             return
         behind = openings(self.probe, tips, state)
+        if behind[..., 0].min() >= 0.0:
+            return
         force = np.abs(self.probe.bond_forces(tips.force_nodes, state)).max(axis=-1)
         noise = self.probe.round_off(tips.force_nodes, state)
         behind = np.where((force > noise).any(axis=1)[:, None, None], behind, 0.0)
