@@ -32,7 +32,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fxcrack.base import log
-from fxcrack.base.checks import number
+from fxcrack.base.checks import number, text
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -128,15 +128,21 @@ class History:
     @overload
     def __getitem__(self, column: int) -> Row: ...
 
-    def __getitem__(self, column: str | int) -> npt.NDArray[Any] | Row:
-        """A column, shape (n_rows,), NaN where a row lacks it; by a whole number, that row.
+    @overload
+    def __getitem__(self, column: slice) -> list[Row]: ...
+
+    def __getitem__(self, column: str | int | slice) -> npt.NDArray[Any] | Row | list[Row]:
+        """A column, shape (n_rows,), NaN where a row lacks it; by a number or a slice, rows.
 
         Raises:
-            InputError: No row has the column.
+            InputError: No row has the column, or it is neither a name nor a number nor a slice.
             IndexError: There are fewer rows.
         """
+        if isinstance(column, slice):
+            return self.rows[column]
         if isinstance(column, int | np.integer):
             return self.rows[int(column)]
+        text("history", "column", column)
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])
