@@ -11,7 +11,7 @@ from mpi4py import MPI
 import fxcrack as fx
 from fxcrack.meshes.blocks import Blocks, build
 from fxcrack.meshes.bodies import two_bodies
-from fxcrack.meshes.dcb import dcb_2d
+from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.steps.newton_path import NewtonLoadPath
 
 FAR = {"x": 0.0, "y": 0.0}
@@ -217,3 +217,45 @@ def test_search_among_yielding_bodies_and_softening_bonds_is_bounded(
     assert np.sort(met)[: 4 - len(jumps)] == pytest.approx([1.0] * (4 - len(jumps)), abs=1e-7)
     # halving to round-off needs 44 trials an event, and is never more than 3 behind
     assert len(trials) < 4 * (44 + 3)
+
+
+@pytest.mark.slow
+def test_bonds_that_soften_at_one_load_in_finite_strain() -> None:
+    """Increments of next to no length lead on where bonds run through unstable states.
+
+    In mode II a front of three nodes, whose bonds soften one after the other, made increments of
+    1e-12 of the load there, each of which left f below 1: hundreds of rows, and no end. The scene
+    has 39 rows to the end now, of which round-off may change some.
+    """
+    bond = fx.Interface(
+        "upper_face", "lower_face", bonded=lambda x: x[0] >= 20.0 - 1e-9, name="b", contact=True
+    )
+    clamped = {"x": 0.0, "y": 0.0, "z": 0.0}
+    scene = fx.Scene(
+        dcb_3d(MPI.COMM_SELF, length=40.0, width=5.0, height=1.5, dx=1.0, dy=2.5, ny=1),
+        materials=fx.Isotropic(70e3, 0.3),
+        model=fx.Solid(),
+        supports=[
+            fx.Displacement("far_upper", **clamped),
+            fx.Displacement("far_lower", **clamped),
+            fx.Displacement("pin_top", y=-1.0),
+        ],
+        debonds=[
+            fx.Debond(
+                bond,
+                fx.VCCT(GIc=0.2, GIIc=0.3, mix=fx.BK(eta=1.6)),
+                release=fx.ProgressiveRelease(),
+            )
+        ],
+        effects=[fx.FiniteStrain()],
+    )
+    rows = []
+
+    def look(event: str, row: Any) -> None:
+        rows.append(event)
+        assert len(rows) < 100, "it crawls"
+
+    step = fx.Static(until=fx.CrackLength(bond, 23.0))
+    history = scene.run(step, progress=False, observers=[look])
+    assert history.reason == "crack length 23 of 'b' reached"
+    assert imbalance(history) < 1e-4

@@ -154,6 +154,8 @@ class Crack:
         if not self._may_overlap or not len(tips):
             return
         behind = openings(self.probe, tips, state)
+        if behind[..., 0].min() >= 0.0:
+            return
         behind = np.where(self.bears(tips, state)[:, None, None], behind, 0.0)
         size = float(np.abs(behind).max())
         if size < max(1e-12 * self.front.surface.facet_size, 1e-9 * np.abs(state.jump).max()):
