@@ -137,13 +137,13 @@ def test_returning_to_an_earlier_increment_takes_its_loads() -> None:
     solver = scene.solver
     loads = [np.full(solver.n_loads, 1e-6 * t) for t in (20.0, 21.0, 25.0)]
     solver.begin(loads[0], loads[1])
-    saved, bonds = solver.remember(), solver.bonds.copy()
+    saved, bonds = solver.remember(), solver.present.bonds.copy()
     reactions = solver.reactions()
     solver.finish()
     solver.begin(loads[1], loads[2])
     assert np.abs(solver.reactions() - reactions).max() > 1e-3 * np.abs(reactions).max()
     solver.recall(saved)
-    assert solver.bonds == pytest.approx(bonds, rel=1e-9, abs=1e-9 * np.abs(bonds).max())
+    assert solver.present.bonds == pytest.approx(bonds, rel=1e-9, abs=1e-9 * np.abs(bonds).max())
     assert solver.reactions() == pytest.approx(reactions, rel=1e-9)
     scene.close()
 

@@ -51,6 +51,7 @@ from fxcrack.solvers.explicit_further import FurtherForces
 from fxcrack.solvers.explicit_ghosts import GhostMotion
 from fxcrack.solvers.explicit_interface import dynamics_of
 from fxcrack.solvers.explicit_joints import JointForces
+from fxcrack.solvers.explicit_kinematics import Kinematics
 from fxcrack.solvers.explicit_loads import LoadsAndMonitors
 from fxcrack.solvers.explicit_mass import ScaledMass
 from fxcrack.solvers.explicit_moving import MovingInterfaces, sliding_masters
@@ -87,6 +88,7 @@ class ExplicitSolver:
         energies: What went in and out so far.
         lumped: Interfaces with lumped masses.
         dynamics: Motion and forces of the interfaces.
+        present: Bond forces and jumps of the present increment.
         joints: Forces at kinks and T joints of shells.
         stability: The stable increment.
         further: Pressures that follow the bodies, bulk viscosity.
@@ -128,8 +130,7 @@ class ExplicitSolver:
             self.bodies.on_unknowns = points
         self._effect = effect
         self.further = FurtherForces(continuum, following, self.bodies.u)
-        self._velocity = points.motion(starting_velocity(continuum, effect.velocity))
-        self._velocity_whole = True  # at interface nodes as well
+        starting = points.motion(starting_velocity(continuum, effect.velocity))
         self.at, self.increments = 0.0, 0
         self.dt = self.stable = self.last_dt = 0.0
         self.seconds = {"internal forces": 0.0, "interface": 0.0, "update": 0.0}
@@ -140,15 +141,15 @@ class ExplicitSolver:
         self.lumped = LumpedInterface(
             continuum.layout, pairs, supports, self.mass.values, self._masters
         )
-        self._make_interfaces()
-        self.prescribed = PrescribedMotion(supports, self.lumped, self._at_interface)
-        self._owned = self.bodies.u.x.array[: continuum.n_local]  # displacement of the owned dofs
+        self._make_interfaces(starting)
+        at_interface = self._kinematics.at_interface
+        self.prescribed = PrescribedMotion(supports, self.lumped, at_interface)
         self.joints = JointForces(continuum, supports, points, self.lumped.nodes.nodes)
-        chosen = np.concatenate([self._at_interface, self.prescribed.dofs, self.joints.free])
-        self._inside = slice(len(self._at_interface), len(chosen) - len(self.joints.free))
+        chosen = np.concatenate([at_interface, self.prescribed.dofs, self.joints.free])
+        self._inside = slice(len(at_interface), len(chosen) - len(self.joints.free))
         self._joined = slice(self._inside.stop, len(chosen))
         self._chosen, self._at_chosen = chosen, np.zeros(len(chosen))
-        self._ghosts = ghosts = GhostMotion(continuum, self.bodies.u, self._at_interface)
+        self._ghosts = ghosts = GhostMotion(continuum, self.bodies.u, at_interface)
         self.motion = BodyMotion(self.bodies, chosen, ghosts.dofs)
         damping = float(effect.rayleigh[0])
         self._outer = OuterForces(
@@ -162,7 +163,7 @@ class ExplicitSolver:
         self._now: Array | None = None
         self._then = np.zeros(self.n_loads)
         self._checkpoints = MotionCheckpoints(
-            continuum, self.bodies, self.fronts, self._moving, self._present, self.stability
+            continuum, self.bodies, self.fronts, self._moving, self.present, self.stability
         )
         self._fields = MotionFields(
             continuum, self.bodies, points, self.joints, self.lumped, self.dynamics, self.prescribed
@@ -172,30 +173,28 @@ class ExplicitSolver:
 
     # -- what does not change ------------------------------------------------------------
 
-    def _make_interfaces(self) -> None:
+    def _make_interfaces(self, velocity: Array) -> None:
         lumped, gdim = self.lumped, self.continuum.gdim
         nodes = lumped.nodes
         self.row_of = lumped.row_of
         self.frames, self.held_by_supports = lumped.pair_frames, lumped.pair_held
         self.dynamics = dynamics_of(lumped, self.pairs, self.fronts, self.continuum)
         self._moving = MovingInterfaces(self.dynamics, self.pairs, self.fronts, self._masters)
-        self._mine = nodes.mine
-        layout = self.continuum.layout
-        self._at_interface = layout.dof(nodes.local[:, None], np.arange(gdim)).ravel()
-        self._present = PresentInterface(lumped, self.dynamics)
-        self.index = self._present.index
-        self.stability = Stability(self.bodies, self.dynamics, self.further, self._at_interface)
+        self._kinematics = Kinematics(
+            self.continuum, self.bodies, self.points, self.dynamics, velocity
+        )
+        self.present = PresentInterface(lumped, self.dynamics)
+        self.index = self.present.index
+        self.stability = Stability(
+            self.bodies, self.dynamics, self.further, self._kinematics.at_interface
+        )
         self._at_nodes = np.zeros(gdim * len(nodes))
         self._has_face_loads = self._patterns.take_faces(lumped)
-        self.dynamics.v = nodes.gather(self._velocity)[:, :gdim]
 
     @property
     def velocity(self) -> Array:
         """In the middle of the last increment, owned dofs, shape (n_local,), length/time."""
-        if not self._velocity_whole and len(self._at_interface):
-            self._velocity[self._at_interface] = self.dynamics.v[self._mine].ravel()
-        self._velocity_whole = True
-        return self._velocity
+        return self._kinematics.velocity
 
     # -- a step begins -------------------------------------------------------------------
 
@@ -258,24 +257,14 @@ class ExplicitSolver:
 
     def set_displacement(self, owned: Array) -> None:
         """Begin with a displacement of the owned dofs, shape (n_local,), length; collective."""
-        x = self.bodies.u.x
-        x.array[: self.continuum.n_local] = self.points.motion(owned)
-        x.scatter_forward()
-
-    def _at_points(self, owned: Array) -> Array:
-        """A motion at the points of the interface nodes, shape (n_nodes, gdim); collective."""
-        return self.lumped.nodes.gather(owned)[:, : self.continuum.gdim]
+        self._kinematics.set_displacement(owned)
 
     def _start(self, coordinates: Array) -> None:
         """Displacements that supports prescribe from the first moment, and the first energies."""
         u = self.bodies.u.x.array
         fixed = np.flatnonzero(self.supports.which >= 0)
         u[fixed] = self.supports.value[fixed] * coordinates[self.supports.which[fixed]]
-        self.dynamics.u = self._at_points(u[: self.continuum.n_local])
-        self.dynamics.begin(coordinates[: len(self.supports.columns)])
-        u[self._at_interface] = self.dynamics.u[self._mine].ravel()
-        self._velocity[self._at_interface] = self.dynamics.v[self._mine].ravel()
-        self.bodies.u.x.scatter_forward()
+        self._kinematics.begin(coordinates[: len(self.supports.columns)])
         self._outer.factors = coordinates[len(self.supports.columns) :]
         self.bodies.begin(self.at)
         self.energies.heated = self._accounts.thermal_part(*self._middle())
@@ -304,20 +293,19 @@ class ExplicitSolver:
         np.negative(chosen, out=chosen)
         if self.dt != self.last_dt:
             self._internal = self.motion.whole()
-        velocity = self.velocity if self._outer.needs_velocity else self._velocity
+        moves = self._kinematics
+        velocity = moves.velocity if self._outer.needs_velocity else moves.v
         self._outer.begin(chosen, self.at, velocity)
         t1 = clock.perf_counter()
         if len(self.lumped.nodes):
-            mine = chosen[: len(self._at_interface)]
+            mine = chosen[: len(moves.at_interface)]
             if self.comm.size > 1:
                 mine = self.lumped.nodes.share(mine.reshape(-1, self.continuum.gdim)).ravel()
             self._at_nodes = mine
             self.accelerate()
         if self.joints.exist:
-            given = self.prescribed.velocities(self._owned, self._coordinates, self.dt)
-            self.joints.find(
-                chosen[self._joined], self._velocity, self.prescribed.dofs, given, self._h
-            )
+            given = self.prescribed.velocities(moves.u, self._coordinates, self.dt)
+            self.joints.find(chosen[self._joined], moves.v, self.prescribed.dofs, given, self._h)
         t2 = clock.perf_counter()
         self.seconds["internal forces"] += t1 - t0
         self.seconds["interface"] += t2 - t1
@@ -325,38 +313,27 @@ class ExplicitSolver:
     def accelerate(self) -> None:
         """Motion of the interface nodes and the forces between them, with the present ties."""
         self.dynamics.accelerate(self._at_nodes, self._coordinates, self._h, self.dt)
-        self._present.forget()
-
-    @property
-    def bonds(self) -> Array:
-        """Forces of the tied bonds on the slaves, shape (n_rows + 1, gdim), force."""
-        return self._present.bonds
-
-    @property
-    def jumps(self) -> Array:
-        """Jumps of the open rows, shape (n_rows + 1, gdim), length."""
-        return self._present.jumps
+        self.present.forget()
 
     @property
     def face_loads(self) -> Array | None:
         """Loads on the slave side, shape (n_rows + 1, gdim), force; ``None``: there are none."""
         if not self._has_face_loads:
             return None
-        out = np.zeros_like(self._present.jumps)
+        out = np.zeros_like(self.present.jumps)
         out[:-1] = self._patterns.on_faces(self._outer.factors)
         return out
 
     def finish(self) -> None:
         """Move the bodies to the end of the increment; collective."""
         start = clock.perf_counter()
-        h, dt, u = self._h, self.dt, self._owned
+        h, dt, moves, u = self._h, self.dt, self._kinematics, self._kinematics.u
         prescribed, dynamics, outer = self.prescribed, self.dynamics, self._outer
         given = prescribed.velocities(u, self._coordinates, dt)
         reactions = self._reactions_to(given)
-        at, mine = self._at_interface, self._mine
         # loads, damping and changes of the increment look at all dofs
         whole = outer.exist or dt != self.last_dt
-        v = self.velocity if whole else self._velocity
+        v = moves.velocity if whole else moves.v
         before = v.copy() if whole else v
         at_joints = v[self.joints.free]
         old = prescribed.velocity(v, dynamics)
@@ -369,10 +346,10 @@ class ExplicitSolver:
         dynamics.advance(h, dt)
         v[prescribed.dofs] = given
         self.joints.move(v, at_joints, self._at_chosen[self._joined], h)
-        if whole and len(at):
-            v[at] = dynamics.v[mine].ravel()
+        if whole:
+            moves.take_velocity()
         # what neighbours need is on its way during the product
-        self._ghosts.start(v, dt, dynamics.u[mine])
+        self._ghosts.start(v, dt, dynamics.u[self.lumped.nodes.mine])
         self.motion.change_others(v)
         power = float(reactions @ (old + prescribed.velocity(v, dynamics)))
         if whole:
@@ -382,16 +359,15 @@ class ExplicitSolver:
             self._accounts.take_change(
                 dt - self.last_dt, self._internal, v - before, elastic, first=not self.increments
             )
-        self._velocity_whole = whole
+        moves.whole = whole
         outer.end()
         add_multiple(u, dt, v)
-        if len(at):
-            u[at] = dynamics.u[mine].ravel()  # to the last digit the same on both sides of a tie
+        moves.take_displacement()
         self._ghosts.finish()
         self.at += dt
         self.last_dt = dt
         self.increments += 1
-        self._present.forget()
+        self.present.forget()
         self.seconds["update"] += clock.perf_counter() - start
 
     def reactions(self) -> Array:
@@ -400,13 +376,13 @@ class ExplicitSolver:
         Between :meth:`begin` and :meth:`finish`. Shape (n_prescribed,), force.
         """
         return self._reactions_to(
-            self.prescribed.velocities(self._owned, self._coordinates, self.dt)
+            self.prescribed.velocities(self._kinematics.u, self._coordinates, self.dt)
         )
 
     def _reactions_to(self, velocities: Array) -> Array:
         """Reactions where dofs within the bodies are given velocities, shape (n_dofs,)."""
         prescribed, dofs = self.prescribed, self.prescribed.dofs
-        acceleration = (velocities - self._velocity[dofs]) / self._h
+        acceleration = (velocities - self._kinematics.v[dofs]) / self._h
         within = self.mass.values[dofs] * acceleration - self._at_chosen[self._inside]
         if self.joints.exist:
             within -= self.joints.forces[dofs]
@@ -446,9 +422,8 @@ class ExplicitSolver:
 
     def remember(self) -> MotionSnapshot:
         """What :meth:`recall` needs to return to the start of this increment; collective."""
-        n = self.continuum.n_local
         return MotionSnapshot(
-            self.bodies.u.x.array[:n].copy(), self.velocity.copy(),
+            self._kinematics.u.copy(), self.velocity.copy(),
             InterfaceSnapshot.of(self.dynamics), self.at, self.last_dt,
             self.energies.totals(), self.increments,
             None if self._now is None else (self._now, self._then), self.bodies.state(),
@@ -456,15 +431,9 @@ class ExplicitSolver:
 
     def recall(self, saved: MotionSnapshot) -> None:
         """Return to the start of an earlier increment; fronts are the caller's. Collective."""
-        n, x = self.continuum.n_local, self.bodies.u.x
-        x.array[:n] = saved.u
-        x.scatter_forward()
-        self.velocity[:] = saved.v
+        self._kinematics.restore(saved.u, saved.v, saved.interfaces)
         self.at, self.last_dt, self.increments = saved.at, saved.last_dt, saved.increments
         self.energies.restore(saved.sums)
-        self.dynamics.u = self._at_points(x.array[:n])
-        self.dynamics.v = self._at_points(self.velocity)
-        saved.interfaces.restore(self.dynamics)
         self.bodies.restore(saved.bodies)
         self._outer.forget()
         if saved.coordinates is not None:
@@ -496,12 +465,12 @@ class ExplicitSolver:
         """Take the present loads, reactions, jumps and forces as :attr:`state`; collective."""
         assert self._now is not None
         columns = len(self.supports.columns)
-        u = self.bodies.u.x.array[: self.continuum.n_local]
+        u = self._kinematics.u
         reactions = self._fields.reactions_by_column(self.reactions(), columns)
         conjugate = [*reactions.tolist(), *self._patterns.conjugates(u)]
         sums = sums_over_ranks(self.comm, *conjugate, *self._patterns.monitored(u))
         self.monitored = sums[len(conjugate) :]
-        force, jumps = self._present.in_frames()
+        force, jumps = self.present.in_frames()
         self.state = Equilibrium(self._now, force, jumps, np.array(sums[: len(conjugate)]))
 
     def about(self) -> dict[str, Any]:
@@ -561,7 +530,7 @@ class ExplicitSolver:
         between :meth:`begin` and :meth:`finish`, of the present state alone.
         """
         forces = self._at_nodes.reshape(-1, self.continuum.gdim)
-        return self._fields.forces(self._at_interface, forces, self.reactions())
+        return self._fields.forces(self._kinematics.at_interface, forces, self.reactions())
 
     def destroy(self) -> None:
         """Nothing is kept that must be freed collectively."""

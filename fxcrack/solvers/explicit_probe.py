@@ -11,30 +11,25 @@ from fxcrack.base.errors import InputError
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.interface.front import Front
 from fxcrack.interface.pair import Pair
+from fxcrack.solvers.explicit_present import PresentInterface
 
 
 class InterfaceValues(Protocol):
-    """The present forces and jumps at the rows of all interfaces, a row of zeros last.
+    """What an increment knows of all interfaces; rows of forces and jumps end with one of zeros.
 
     Attributes:
         continuum: Bodies.
         pairs: Interfaces.
         fronts: Their fronts.
         row_of: Row of each slave node per pair, -1 where it has no jump, shape (n_nodes,).
+        present: Bond forces and jumps of the present increment.
     """
 
     continuum: Continuum
     pairs: list[Pair]
     fronts: list[Front]
     row_of: list[Ints]
-
-    @property
-    def bonds(self) -> Array:
-        """Forces of the bonds on the slaves, shape (n_rows + 1, gdim), force."""
-
-    @property
-    def jumps(self) -> Array:
-        """Jumps, shape (n_rows + 1, gdim), length."""
+    present: PresentInterface
 
     @property
     def face_loads(self) -> Array | None:
@@ -81,7 +76,7 @@ class ExplicitFrontProbe:
 
     def bond_forces(self, nodes: Ints, state: Any) -> Array:
         """Bond forces, tension positive, global vectors of shape (..., 3) [force]."""
-        return -self._vectors(nodes, self._values.bonds)
+        return -self._vectors(nodes, self._values.present.bonds)
 
     def round_off(self, nodes: Ints, state: Any) -> Array:
         """Nothing: forces of explicit dynamics are not searched for a load, shape (...) [force]."""
@@ -89,7 +84,7 @@ class ExplicitFrontProbe:
 
     def jumps(self, nodes: Ints, state: Any) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""
-        return self.pair.interface.opening_factor * self._vectors(nodes, self._values.jumps)
+        return self.pair.interface.opening_factor * self._vectors(nodes, self._values.present.jumps)
 
     @property
     def bodies(self) -> Any:

@@ -263,7 +263,7 @@ class ExplicitDriver:
         dynamics = solver.dynamics
         rows = self._may_overlap & ~dynamics.elastic.active
         gap, row = dynamics.open_pairs.smallest_gap(rows, dynamics.gap)
-        if row < 0 or gap >= -_OVERLAP * float(np.abs(solver.jumps).max()):
+        if row < 0 or gap >= -_OVERLAP * float(np.abs(solver.present.jumps).max()):
             return
         p = int(solver.lumped.pair[row])
         self._may_overlap[solver.lumped.pair == p] = False

@@ -136,7 +136,7 @@ class ReleaseControl:
         chosen = np.flatnonzero(values.f >= self.onset * (1.0 - _TIE))
         nodes = np.unique(values.tips.force_nodes[chosen])
         rows = solver.row_of[crack.p][nodes]
-        forces = solver.bonds[rows]
+        forces = solver.present.bonds[rows]
         crack.record(nodes, values, solver.state, solver.at)
         if law.driver == "opening":
             energy, area, force = self._to_spend(nodes, values, forces)
