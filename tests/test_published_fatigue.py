@@ -92,7 +92,7 @@ def test_moments_on_both_arms_grow_by_the_law_on_elements_of_2_mm(phi: float, ra
         supports=HELD_FAR,
         loads=[
             fx.Traction("end_upper", (bending(two + one), 0.0)),
-            fx.Traction("end_lower", (bending(two - one), 0.0)),
+            fx.Traction("end_lower", (bending(one - two), 0.0)),
         ],
         debonds=[fx.Debond(interface, FATIGUE)],
     )
