@@ -7,8 +7,8 @@
 #
 # Node by node, each bond holds until its element is passed. A node that is ahead of its neighbours
 # has less G than the smooth front, so the front takes longer, and on elements 1 wide it comes to
-# the threshold (0.01 of the toughness) within the first row; on elements 2 wide it does not. Take
-# `partial=True` for fronts in 3-D.
+# the threshold (0.01 of the toughness) within the first row; on elements 2 wide it does not.
+# `partial=True` is the default in 3-D.
 #
 # `fx.plots.tip_growth` gives N, a, dG and da/dN of every tip, `fx.front_lines` the front with its
 # G, and `scene.fatigue.ligaments` the part of its element that each node has passed.
@@ -26,9 +26,9 @@ from matplotlib.figure import Figure
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.demos.front3d import make_scene
 from fxcrack.demos.show import arguments, table
 from fxcrack.history import Row
-from fxcrack.meshes.dcb import dcb_3d
 from fxcrack.output.plots.style import COLOURS, dress, legend, new_figure, save
 
 Array = npt.NDArray[np.float64]
@@ -57,21 +57,8 @@ class Fronts:
 
 def run(partial: bool, dy: float = 1.0, lengths: tuple[float, ...] = (11.0, 12.0, 13.0)) -> Fronts:
     """Grow the front until its mean has passed some lengths."""
-    bond = fx.Interface(
-        slave="upper_face", master="lower_face", bonded=lambda x: x[0] >= A0 - 1e-9, name="bond"
-    )
-    scene = fx.Scene(
-        dcb_3d(length=24.0, height=1.5, width=WIDTH, dx=DX, dy=dy, ny=2),
-        materials=fx.Isotropic(E=70e3, nu=0.3),
-        model=fx.Solid(),
-        supports=[
-            fx.Displacement("far_upper", x=0.0, y=0.0, z=0.0),
-            fx.Displacement("far_lower", x=0.0, y=0.0, z=0.0),
-            fx.Displacement("end_upper", y=0.5),
-            fx.Displacement("end_lower", y=-0.5),
-        ],
-        debonds=[fx.Debond(bond, fx.Fatigue(GIc=5.0, paris=LAW, partial=partial))],
-    )
+    criterion = fx.Fatigue(GIc=5.0, paris=LAW, partial=partial)
+    scene, bond = make_scene(A0, None, DX, dy, 2, length=24.0, width=WIDTH, criterion=criterion)
     shapes: list[tuple[Array, Array, Array]] = []
 
     def look(event: str, row: Row) -> None:

@@ -37,14 +37,18 @@ STRAIN_BEAM = CorrectedBeam(E=70e3 / (1.0 - 0.3**2), E22=70e3, G=70e3 / 2.6, h=1
 
 def make_scene(
     a: float,
-    release: fx.StepRelease | fx.ProgressiveRelease,
+    release: fx.ReleaseLaw | None,
     dx: float,
     dy: float,
     ny: int,
     order: int = 1,
+    *,
+    length: float = 100.0,
+    width: float = 20.0,
+    criterion: fx.Criterion | None = None,
 ) -> tuple[fx.Scene, fx.Interface]:
-    """The bench specimen with a straight front at a."""
-    mesh = dcb_3d(length=100.0, height=1.5, width=20.0, dx=dx, dy=dy, ny=ny, order=order)
+    """The bench specimen with a straight front at a, or one of another size or criterion."""
+    mesh = dcb_3d(length=length, height=1.5, width=width, dx=dx, dy=dy, ny=ny, order=order)
     bond = fx.Interface(
         slave="upper_face", master="lower_face", bonded=lambda x: x[0] >= a - 1e-9, name="bond"
     )
@@ -58,7 +62,7 @@ def make_scene(
             fx.Displacement("end_upper", y=0.5),
             fx.Displacement("end_lower", y=-0.5),
         ],
-        debonds=[fx.Debond(bond, fx.VCCT(GIc=G_IC), release=release)],
+        debonds=[fx.Debond(bond, criterion or fx.VCCT(GIc=G_IC), release=release)],
     )
     return scene, bond
 

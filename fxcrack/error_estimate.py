@@ -96,8 +96,8 @@ class Estimate:
         difference: Largest difference between the orders.
         interface: Name of the interface.
         simplices: Whether the cells are triangles or tetrahedra.
-        domain: Difference of G from that of the domain integral at the same state; ``None`` where
-            it was not found.
+        domain: Difference of G from that of the domain integral at the same state, at the tip of
+            largest f: along a front, one of its nodes; ``None`` where it was not found.
         jumps: Part of the strain energy that belongs to jumps of the strain between cells; ``None``
             where the other order tells the stiffness of the bodies.
         seconds: What the estimate has cost.
@@ -137,7 +137,7 @@ class Estimate:
         else:
             text += (
                 f"the domain integral, from which G differs by {_percent(self.domain)} at the same "
-                "state, "
+                "state at the tip that grows first, "
             )
             text += (
                 f"for the stiffness of the bodies by the {other}-order solution on the same mesh"

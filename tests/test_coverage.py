@@ -71,7 +71,7 @@ CRITERIA: dict[str, tuple[Any, str]] = {
     ),
     "VCCT": (fx.VCCT(**MIX), "GI"),
     "enhanced VCCT": (fx.EnhancedVCCT(**MIX, GIc_p=0.08, GIIc_p=0.2), "GI"),
-    "fatigue": (fx.Fatigue(**MIX, paris=PARIS), "dG"),
+    "fatigue": (fx.Fatigue(**MIX, paris=PARIS, partial=False), "dG"),
 }
 
 

@@ -119,6 +119,18 @@ def test_a_default_that_a_deck_does_not_have_is_said(tmp_path, caplog):
         fx.write_deck(one, [INCREMENTS], tmp_path / "a.inp")
         assert caplog.text.count("released progressively by default") == said
         assert fx.read_deck(tmp_path / "a.inp").scene.debonds[0].release == fx.StepRelease()
+    turn = fx.Amplitude((0.0, 0.5, 1.0), (0.1, 1.0, 0.1))
+    for partial, said in ((False, 0), (None, 1)):
+        paris = fx.Paris(10.0, -1.0, 1e-3, 2.0, 0.01, 0.95)
+        one = scene(
+            mesh, fx.Fatigue(GIc=0.5, paris=paris, partial=partial), model=fx.Solid(),
+            loads=[fx.PointForce("pin_top", (0.0, 20.0, 0.0), turn)],
+            supports=[fx.Displacement("far_upper", x=0.0, y=0.0, z=0.0),
+                      fx.Displacement("far_lower", x=0.0, y=0.0, z=0.0)],
+        )  # fmt: skip
+        fx.write_deck(one, [fx.Cycles(period=(0.0, 1.0), n_max=500.0)], tmp_path / "b.inp")
+        assert caplog.text.count("grows in part by default") == said
+        assert fx.read_deck(tmp_path / "b.inp").scene.debonds[0].criterion.partial is False
     with pytest.raises(fx.InputError, match="the release law Progressive"):
         one = scene(mesh, release=fx.ProgressiveRelease(), model=fx.Solid())
         fx.write_deck(one, [INCREMENTS], tmp_path / "a.inp")

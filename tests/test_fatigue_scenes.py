@@ -285,7 +285,7 @@ def wide(comm: Any, **options: Any) -> fx.Scene:
         materials=STEEL,
         model=fx.Solid(),
         supports=CLAMPED_3D,
-        debonds=[fx.Debond(bond(8.0), fatigue_law(**options))],
+        debonds=[fx.Debond(bond(8.0), fatigue_law(partial=False, **options))],
     )
 
 

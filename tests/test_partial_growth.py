@@ -98,10 +98,10 @@ def test_blocks_of_another_amplitude_add_up() -> None:
     parts.close()
 
 
-def wide(comm: Any, dy: float, dx: float = 1.0, **options: Any) -> fx.Scene:
+def wide(comm: Any, dy: float, dx: float = 1.0, order: int = 1, **options: Any) -> fx.Scene:
     """A specimen in 3-D on which the front bows out."""
     law = fx.Paris(c1=0.0, c2=-2.0, c3=0.5, c4=5.0, r1=0.01, r2=0.99)
-    mesh = dcb_3d(comm, length=24.0, height=1.5, width=10.0, dx=dx, dy=dy, ny=2)
+    mesh = dcb_3d(comm, length=24.0, height=1.5, width=10.0, dx=dx, dy=dy, ny=2, order=order)
     criterion = fx.Fatigue(**({"GIc": 5.0, "paris": law, "partial": True} | options))
     return specimen(mesh, a0=10.0, supports=CLAMPED_3D, criterion=criterion)
 
@@ -113,15 +113,26 @@ def front_of(scene: fx.Scene, dx: float = 1.0) -> tuple[fx.FrontLine, np.ndarray
 
 
 def test_a_front_in_3d_whose_nodes_jump_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
-    """Once; not where the front grows in part, nor where it is one element wide."""
-    for dy, partial in ((2.5, True), (10.0, False), (2.5, False)):
+    """Once; not where the front grows in part, the default, nor where it is one element wide."""
+    for dy, partial in ((2.5, None), (10.0, False), (2.5, False)):
         assert "jump one after" not in caplog.text
         scene = wide(MPI.COMM_SELF, dy, dx=2.0, partial=partial)
         for n in (1, 2):
             step = fx.Cycles(maximum=0.3, ratio=0.1, until=fx.Releases(n))
             scene.run(step, progress=False)
+        assert bool((scene.fatigue.ligaments[0].part > 0.0).any()) == (partial is None)
         scene.close()
     assert caplog.text.count("jump one after") == 1
+    for options, why in (
+        ({"order": 2}, "elements of second order"),
+        ({"method": "closure"}, "method='closure'"),
+        ({"credit": True}, "credit=True"),
+    ):
+        order = options.pop("order", 1)
+        scene = wide(MPI.COMM_SELF, 5.0, dx=4.0, partial=None, **options, order=order)
+        scene.run(fx.Cycles(maximum=0.3, ratio=0.1, n_max=1e-6), progress=False)
+        scene.close()
+        assert f"({why})" in caplog.text
 
 
 @pytest.mark.slow

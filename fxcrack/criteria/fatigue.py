@@ -43,12 +43,14 @@ class Fatigue(RateCriterion):
         partial: Whether every front node advances through its element cycle by cycle, its bond
             fading in proportion (:mod:`fxcrack.criteria.ligaments`), so that a front in 3-D stays
             smooth. Otherwise bonds fail one after the other, each at the end of its element.
+            ``None``: in 3-D on linear solids of first order with ``method="vcct"``, without
+            friction and without ``credit``.
     """
 
     paris: Paris | None = None
     growth: FatigueLaw | UserFunction | None = None
     credit: bool = field(default=False)
-    partial: bool = field(default=False)
+    partial: bool | None = field(default=None)
 
     grows_in_cycles: ClassVar[bool] = True
 
@@ -79,7 +81,8 @@ class Fatigue(RateCriterion):
         given = self.paris if self.growth is None else self.growth
         keep(self, growth=fatigue_law_of("Fatigue", cast(FatigueLaw, given)))
         keep(self, credit=flag("Fatigue", "credit", self.credit))
-        keep(self, partial=flag("Fatigue", "partial", self.partial))
+        if self.partial is not None:
+            keep(self, partial=flag("Fatigue", "partial", self.partial))
         if self.partial and self.method != "vcct":
             raise InputError(
                 f"Fatigue: partial=True needs method='vcct', not '{self.method}': the energy of "

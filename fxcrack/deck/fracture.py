@@ -297,7 +297,8 @@ def _rates(card: Card, kind: str, nodal: dict[str, NodalField] | None) -> Criter
                 card.place,
                 _UPPER,
             )
-        return Fatigue(**toughness, **options, paris=paris)
+        # the card lets nodes go one after the other
+        return Fatigue(**toughness, **options, paris=paris, partial=False)
     if card.has("UNSTABLE GROWTH TOLERANCE"):
         given = card.options["UNSTABLEGROWTHTOLERANCE"]
         options["unstable_tolerance"] = (

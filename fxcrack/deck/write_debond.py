@@ -10,6 +10,7 @@ from fxcrack.criteria import (
     CrackLengthVsTime,
     CrackOpening,
     CriticalStress,
+    Fatigue,
     ProgressiveRelease,
     RampRelease,
     StepRelease,
@@ -47,6 +48,15 @@ def debond_lines(debond: Debond, step: Step, pairs: Sequence[Pair], *, nodal: bo
             title,
         )
         release = StepRelease()
+    criterion = debond.criterion
+    in_3d = any(pair.surface.dim == 2 for pair in pairs)
+    if in_3d and isinstance(criterion, Fatigue) and criterion.partial is None:
+        log.warn(
+            "write_deck: interface '%s' grows in part by default (solids of first order in 3-D), "
+            "which a deck does not have: read again its nodes go one after the other, and cycles "
+            "come out too many. Name it, partial=False, if that is meant",
+            title,
+        )
     if isinstance(release, AmplitudeRelease):
         points = zip(release.times, release.fractions, strict=True)
         lines = broken([number(x) for point in points for x in point], 8, comma=False)

@@ -18,6 +18,8 @@ import numpy.typing as npt
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import ComesApart, InputError
+from fxcrack.continuum.continuum_shell import ContinuumShell
+from fxcrack.continuum.shell_bodies import ShellBodies
 from fxcrack.criteria import Regime
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
@@ -65,14 +67,14 @@ def attach_ligaments(analysis: Analysis) -> None:
         InputError: Some cracks grow in part and others do not, or where that is not possible.
     """
     ways = {cyclic_parts(g)[0].partial for g in analysis.active}
-    if ways == {False}:
-        _warn_of_jumps(analysis)
-        return
-    if len(ways) > 1:
+    if ways >= {True, False}:
         raise InputError(
             "Cycles: some interfaces have Fatigue(partial=True) and others have not; give all of "
             "them the same, or let them grow in steps of their own, grow=[...]"
         )
+    if not grows_in_part(analysis):
+        _warn_of_jumps(analysis)
+        return
     if analysis.condensed.system.friction is not None:
         raise InputError(
             "Cycles: Fatigue(partial=True) is not available with friction: what is left of a bond "
@@ -91,8 +93,9 @@ def attach_ligaments(analysis: Analysis) -> None:
             if slender > _SLENDER:
                 log.warn(
                     "interface '%s': elements at the front are %.3g times as long in the growth "
-                    "direction as they are wide; with Fatigue(partial=True) lives then depend on "
-                    "the mesh by more than 10 %%: make them at most as long as wide",
+                    "direction as they are wide; growing in part (Fatigue(partial=True), the "
+                    "default in 3-D) lives then depend on the mesh by more than 10 %%: make them "
+                    "at most as long as wide",
                     g.title,
                     slender,
                 )
@@ -110,17 +113,45 @@ def _warn_of_jumps(analysis: Analysis) -> None:
             continue
         analysis.said.add(key)
         log.warn(
-            "interface '%s': without Fatigue(partial=True) nodes of a front in 3-D jump one after "
-            "the other, the rate at a node ahead of its neighbours is low, and cycles come out too "
-            "many: 10 to 100 times in a double cantilever beam at an exponent of 4; give "
-            "Fatigue(partial=True) (elements of first order, method='vcct', no friction)",
+            "interface '%s': without Fatigue(partial=True) (%s) nodes of a front in 3-D jump one "
+            "after the other, the rate at a node ahead of its neighbours is low, and cycles come "
+            "out too many: 10 to 100 times in a double cantilever beam at an exponent of 4",
             g.title,
+            _why_by_node(analysis) or "partial=False",
         )
 
 
 def grows_in_part(analysis: Analysis) -> bool:
-    """Whether fronts advance through their elements in part."""
-    return any(cyclic_parts(g)[0].partial for g in analysis.active)
+    """Whether fronts advance through their elements in part.
+
+    Where no interface says so, they do in 3-D, if that is possible.
+    """
+    ways = {cyclic_parts(g)[0].partial for g in analysis.active}
+    if True in ways or False in ways:
+        return True in ways
+    return not _why_by_node(analysis)
+
+
+def _why_by_node(analysis: Analysis) -> str:
+    """Why fronts do not grow in part by default, in words; empty where they do."""
+    if all(g.front.surface.dim < 2 for g in analysis.active):
+        return "a model in the plane"
+    if not analysis.linear:
+        return "bodies are not linear"
+    continuum = analysis.continuum
+    if isinstance(continuum, ShellBodies) or any(
+        isinstance(m, ContinuumShell) for m in continuum.part_materials
+    ):
+        return "shells"
+    if continuum.order > 1:
+        return "elements of second order"
+    if analysis.condensed.system.friction is not None:
+        return "friction"
+    criteria = [cyclic_parts(g)[0] for g in analysis.active]
+    others = [c.method for c in criteria if c.method != "vcct"]
+    if others:
+        return f"method='{others[0]}'"
+    return "credit=True" if any(c.credit for c in criteria) else ""
 
 
 def passed_area(analysis: Analysis, g: Crack, values: TipValues) -> float:

@@ -111,7 +111,7 @@ def solid(comm: MPI.Intracomm, order: int = 1, **options: Any) -> fx.Scene:
 
 
 def fatigue(comm: MPI.Intracomm) -> fx.Scene:
-    return short(comm, criterion=fx.Fatigue(GIc=0.4, paris=LAW))
+    return short(comm, criterion=fx.Fatigue(GIc=0.4, paris=LAW, partial=False))
 
 
 def bent(comm: MPI.Intracomm, **options: Any) -> fx.Scene:
