@@ -30,6 +30,24 @@ def test_materials_and_interactions_that_nothing_names(tmp_path):
         read(tmp_path, text.replace("MATERIAL=M", "MATERIAL=USER") + OPENED.format(criterion=VCCT))
 
 
+def test_elements_that_only_mark_parts_of_the_mesh(tmp_path):
+    """As mesh generators export them: trusses on lines of a plane mesh."""
+    line = "*ELEMENT, TYPE=T3D2, ELSET=LINE{}\n{}\n"
+    marks = line.format(1, "11, 1, 4") + line.format(2, "12, 3, 6")
+    text = PLATE.replace("*NSET, NSET=LEFT\n1, 4", marks + "*NSET, NSET=LEFT, ELSET=LINE1")
+    found = read(tmp_path, text + STEP.replace("RIGHT", "LINE2"))
+    plain = read(tmp_path, PLATE + STEP)
+    (left, right), (left_too, right_too) = (
+        [set(x.raw.groups[s.where].rows.ravel()) for s in x.arguments["supports"]]
+        for x in (found, plain)
+    )
+    assert left == left_too and right == right_too
+    assert any("2 elements of type T3D2 have no section" in x for x in found.report.replaced)
+    bodies = text + "*SOLID SECTION, ELSET=LINE2, MATERIAL=STEEL\n" + STEP
+    with pytest.raises(DeckError, match="T3D2 is refused: trusses"):
+        read(tmp_path, bodies)
+
+
 def test_what_follows_a_material_that_nothing_names(tmp_path):
     spare = "*MATERIAL, NAME=SPARE\n*CONDUCTIVITY\n1.\n*DENSITY\n7.\n*EXPANSION\n1e-5\n*MYSTERY\n"
     found = read(tmp_path, PLATE + spare + STEP)

@@ -109,7 +109,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     _check_steps(model.steps, explicit=explicit)
     finite = _finite(model, procedures, report)
     periods = [p.period for p in procedures]
-    amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
+    cycles = [p.period.end - p.period.start for p in procedures if isinstance(p.step, Cycles)]
+    amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0, cycles)
     boundary = Boundary(flat, periods)
     boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
     constraints = read_constraints(cards, flat)
