@@ -524,7 +524,7 @@ DBT, BDSTAT, ENRRT, EFENRRTR
 
 
 def test_two_instances_of_one_part_give_the_same_history(tmp_path):
-    deck = fx.read_deck(write(tmp_path, ARMS))
+    deck = fx.read_deck(write(tmp_path, ARMS), order=1)
     by_hand, step = demo.same_in_python(40, 1)
     history, other = deck.run(), by_hand.run(step)
     assert len(history) == len(other) and history.rows[-1]["released[Upper-1.Face]"] > 0
