@@ -87,6 +87,24 @@ def test_op_new_without_data_takes_all_away(tmp_path):
         read(tmp_path, PLATE + first + second.replace(", OP=NEW", ""))
 
 
+def test_op_new_without_data_before_cards_without_it(tmp_path):
+    """As PrePoMax writes its steps for CalculiX, with the solver on the procedure card."""
+    first = STEP.replace("*END STEP", "*CLOAD\n6, 2, 1.\n*END STEP")
+    second = (
+        "*Step, Inc=100\n*Static, Solver=Pardiso\n0.5, 1, 1E-05, 1E+30\n*Boundary, op=New\n"
+        "*Boundary\nLEFT, 1, 2, 0\nRIGHT, 1, 1, 0.2\n*Cload, op=New\n*Dload, op=New\n"
+        "*Dload\nLAST, P2, 3.\n*Node file\nRF, U\n*End step\n"
+    )
+    force, pressure = read(tmp_path, PLATE + first + second).arguments["loads"]
+    assert force.amplitude(1.0) * force.value[1] == 1.0 and force.amplitude(2.0) == 0.0
+    assert pressure.amplitude(1.0) == 0.0 and pressure.amplitude(2.0) * pressure.value == 3.0
+    late = second.replace("*Dload, op=New\n", "").replace(
+        "*Node file", "*Dload, op=New\n*Node file"
+    )
+    with pytest.raises(DeckError, match="asks for it on all of them"):
+        read(tmp_path, PLATE + first + late)
+
+
 def test_ties_reach_large_facets_beside_small_ones():
     """Nodes on a facet of 20 x 1 reach it, though 12 small ones beside it are nearer by centre."""
     corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]])

@@ -19,7 +19,7 @@ from fxcrack.continuum.loads import (
     Pressure,
     Traction,
 )
-from fxcrack.deck.cards import Card, Row, key, label, squeeze
+from fxcrack.deck.cards import Card, Row, fresh_cards, key, label, squeeze
 from fxcrack.deck.constraints import Carrier
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
@@ -107,10 +107,7 @@ class Loads:
         moved: set[tuple[str, ...]] = set()
         for kind in _KINDS:
             chosen = [card for card in cards if card.keyword == kind]
-            fresh = [c for c in chosen if c.choose("OP", ("MOD", "NEW"), "MOD") == "NEW"]
-            if fresh and len(fresh) < len(chosen):
-                others = next(c for c in chosen if c not in fresh)
-                others.fail(f"OP=NEW on another *{kind} of the step asks for it on all of them")
+            fresh = fresh_cards(chosen)
             if fresh:
                 for mark, entry in self._entries.items():
                     if entry.kind == kind:
