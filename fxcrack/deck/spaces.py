@@ -272,12 +272,6 @@ class Space:
         parts = [self.rigid_labels, *(m.table.labels for m in self.markers.values())]
         return distinct(np.concatenate(parts))
 
-    @property
-    def element_labels(self) -> Ints:
-        """Numbers of all elements, ascending, shape (n,)."""
-        parts = [e.table.labels for e in self.elements.values()]
-        return distinct(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
-
     def add_to_set(
         self, card: Card, kind: str, name: str, labels: Ints, *, space: str = HOME
     ) -> None:
