@@ -205,3 +205,17 @@ def test_constraints_inside_parts(tmp_path):
 def test_constraints_that_are_refused(tmp_path, text, words):
     with pytest.raises(DeckError, match=words):
         fx.read_deck(write(tmp_path, BEAM + text)).run(progress=False)
+
+
+def test_loads_of_a_reference_node_by_amplitudes_of_their_own(tmp_path):
+    """Each is a load of the scene with a name of its own, as are those of a surface named alike."""
+    curves = "*AMPLITUDE, NAME=A\n0., 0., 1., 1.\n*AMPLITUDE, NAME=B\n0., 1., 1., 1.\n"
+    pull = "*CLOAD, AMPLITUDE=A\nREF, 1, 2.", "*CLOAD, AMPLITUDE=B\nREF, 2, 3."
+    push = "*CLOAD\nEND, 1, 1.", "*DSLOAD\nEND, P, 1."
+    ends = "*NSET, NSET=END\n11, 111\n"
+    deck = fx.read_deck(
+        write(tmp_path, BEAM + KINEMATIC + curves + ends + stepped(*pull, *push)), order=2
+    )
+    names = [load.title for load in deck.scene.input.loads]
+    assert len(names) == 4 == len(set(names))
+    deck.scene.close()

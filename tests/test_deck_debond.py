@@ -288,6 +288,22 @@ def test_one_criterion_in_all_steps(tmp_path):
     assert read(tmp_path, BONDED + tied + OPENED.format(criterion=VCCT)).steps[0].grow == ()
 
 
+def test_a_curve_of_crack_length_by_steps(tmp_path):
+    length = "*FRACTURE CRITERION, TYPE=CRACK LENGTH, NSET=BOND, TOLERANCE=0.01\n"
+    lines = ("0.2, 1., 0.8, 2.5", "0.8, 2.5,\n1.4, 4.", "2.5, 4.5, 3., 5.")
+    first, second, third = (OPENED.format(criterion=length + line) for line in lines)
+    found = read(tmp_path, BONDED + first + second + third).arguments["debonds"][0].criterion
+    # each curve counts in its step: that of the first stays, that of the second has begun before
+    # its step, that of the third begins within it
+    assert [found.length(t) for t in (0.1, 0.2, 0.8, 1.0)] == [-math.inf, 1.0, 2.5, 2.5]
+    soon = 1.0 + 1e-8
+    assert [found.length(t) for t in (soon, 1.4, 2.0, 2.4, 2.5, 3.0)] == pytest.approx(
+        [3.0, 4.0, 4.0, 4.0, 4.5, 5.0], rel=1e-6
+    )
+    bad = BONDED + first + second.replace("1.4, 4.", "0.7, 4.")
+    refused(tmp_path, "the times of the curve must increase", bad)
+
+
 def test_fatigue_belongs_to_cycles_and_their_amplitudes_return(tmp_path):
     fatigue = "*FRACTURE CRITERION, TYPE=FATIGUE\n0.5, -0.1, 1E-6, 1., , , 1., 1.\n1., 2."
     deck = fx.read_deck(write(tmp_path, bonded(fatigue)))
@@ -508,7 +524,7 @@ DBT, BDSTAT, ENRRT, EFENRRTR
 
 
 def test_two_instances_of_one_part_give_the_same_history(tmp_path):
-    deck = fx.read_deck(write(tmp_path, ARMS))
+    deck = fx.read_deck(write(tmp_path, ARMS), order=1)
     by_hand, step = demo.same_in_python(40, 1)
     history, other = deck.run(), by_hand.run(step)
     assert len(history) == len(other) and history.rows[-1]["released[Upper-1.Face]"] > 0

@@ -30,6 +30,24 @@ def test_materials_and_interactions_that_nothing_names(tmp_path):
         read(tmp_path, text.replace("MATERIAL=M", "MATERIAL=USER") + OPENED.format(criterion=VCCT))
 
 
+def test_elements_that_only_mark_parts_of_the_mesh(tmp_path):
+    """As mesh generators export them: trusses on lines of a plane mesh."""
+    line = "*ELEMENT, TYPE=T3D2, ELSET=LINE{}\n{}\n"
+    marks = line.format(1, "11, 1, 4") + line.format(2, "12, 3, 6")
+    text = PLATE.replace("*NSET, NSET=LEFT\n1, 4", marks + "*NSET, NSET=LEFT, ELSET=LINE1")
+    found = read(tmp_path, text + STEP.replace("RIGHT", "LINE2"))
+    plain = read(tmp_path, PLATE + STEP)
+    (left, right), (left_too, right_too) = (
+        [set(x.raw.groups[s.where].rows.ravel()) for s in x.arguments["supports"]]
+        for x in (found, plain)
+    )
+    assert left == left_too and right == right_too
+    assert any("2 elements of type T3D2 have no section" in x for x in found.report.replaced)
+    bodies = text + "*SOLID SECTION, ELSET=LINE2, MATERIAL=STEEL\n" + STEP
+    with pytest.raises(DeckError, match="T3D2 is refused: trusses"):
+        read(tmp_path, bodies)
+
+
 def test_what_follows_a_material_that_nothing_names(tmp_path):
     spare = "*MATERIAL, NAME=SPARE\n*CONDUCTIVITY\n1.\n*DENSITY\n7.\n*EXPANSION\n1e-5\n*MYSTERY\n"
     found = read(tmp_path, PLATE + spare + STEP)
@@ -67,6 +85,24 @@ def test_op_new_without_data_takes_all_away(tmp_path):
     assert load.amplitude(1.0) * load.value[1] == 1.0 and load.amplitude(2.0) == 0.0
     with pytest.raises(DeckError, match="there is no data line"):
         read(tmp_path, PLATE + first + second.replace(", OP=NEW", ""))
+
+
+def test_op_new_without_data_before_cards_without_it(tmp_path):
+    """As PrePoMax writes its steps for CalculiX, with the solver on the procedure card."""
+    first = STEP.replace("*END STEP", "*CLOAD\n6, 2, 1.\n*END STEP")
+    second = (
+        "*Step, Inc=100\n*Static, Solver=Pardiso\n0.5, 1, 1E-05, 1E+30\n*Boundary, op=New\n"
+        "*Boundary\nLEFT, 1, 2, 0\nRIGHT, 1, 1, 0.2\n*Cload, op=New\n*Dload, op=New\n"
+        "*Dload\nLAST, P2, 3.\n*Node file\nRF, U\n*End step\n"
+    )
+    force, pressure = read(tmp_path, PLATE + first + second).arguments["loads"]
+    assert force.amplitude(1.0) * force.value[1] == 1.0 and force.amplitude(2.0) == 0.0
+    assert pressure.amplitude(1.0) == 0.0 and pressure.amplitude(2.0) * pressure.value == 3.0
+    late = second.replace("*Dload, op=New\n", "").replace(
+        "*Node file", "*Dload, op=New\n*Node file"
+    )
+    with pytest.raises(DeckError, match="asks for it on all of them"):
+        read(tmp_path, PLATE + first + late)
 
 
 def test_ties_reach_large_facets_beside_small_ones():

@@ -29,12 +29,20 @@ def strip(kind, ny, nx, length=8.0, order=None):
 @pytest.mark.parametrize("kind", ["CPE4R", "CPS4R", "CAX4R", "C3D8R", "CPE4I", "CPS4I", "C3D8I"])
 def test_locking_of_the_elements_in_place_of_others_is_said_with_numbers(tmp_path, kind):
     text = strip(kind, 2, 16).replace("\n2.0\n", "\n" if kind[2] in "XD" else "\n2.0\n")
-    (said,) = (line for line in read(tmp_path, text).report.replaced if "lock" in line)
+    path = write(tmp_path, text)
+    (said,) = (line for line in translated(path, order=1).report.replaced if "lock" in line)
     # square elements, two over the thickness: (1/1.3 (1/0.7 + 1/2) - 1)/4
     assert f"in place of {kind} lock in bending" in said and "by about 12 %" in said
     assert "with 2 elements over the smallest dimension" in said and "1 times as long" in said
     assert "--order 2" in said
-    path = tmp_path / "model.inp"
+    raised = read(tmp_path, text)  # unasked, as they would be too stiff by 5 % or more
+    (said,) = (line for line in raised.report.replaced if "lock" in line)
+    assert "would be too stiff by about 12 %" in said and "--order 1" in said
+    assert raised.raw.order == 2
+    few = read(
+        tmp_path, strip(kind, 4, 32).replace("\n2.0\n", "\n" if kind[2] in "XD" else "\n2.0\n")
+    )
+    assert few.raw.order == 1 and any("by about 3 %" in line for line in few.report.replaced)
     assert not [x for x in translated(path, order=2).report.replaced if "lock" in x]
     plain = read(tmp_path, strip(kind[:-1], 2, 16).replace("\n2.0\n", "\n")).report.replaced
     assert not [line for line in plain if "lock" in line]
@@ -86,5 +94,5 @@ def test_terminal_check_and_both_reports_say_it(shared_path, capfd):
         for place in (listed, terminal, *pages):
             words = " ".join(place.split())
             assert "with 1 element over the smallest dimension" in words and "48 %" in words
-            assert "--order 2" in words
+            assert "--order 1" in words
     MPI.COMM_WORLD.Barrier()

@@ -373,6 +373,7 @@ def test_parts_instances_and_their_names(tmp_path):
         ("PART=BAR", "PART=BARS", "there is no part 'BARS' \\(did you mean 'BAR'"),
         ("*END PART\n", "", "begins inside"),
         ("*END INSTANCE\n", "", "begins inside"),
+        ("10., 0., 0.\n", "", "the first line is the translation"),
         ("*END PART\n", "*END PART\n*END PART\n", "it ends nothing"),
         ("NAME=Bar-1", 'NAME="Bar 2"', "exists already"),
         ("Bar-1.Foot, ENCASTRE", "Bar-3.Foot, ENCASTRE", "there is no node set 'Bar-3.Foot'"),

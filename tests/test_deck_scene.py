@@ -231,6 +231,12 @@ def test_smooth_step_and_periodic_amplitudes(tmp_path):
     found = read(tmp_path, text.format("PERIODIC", "1, 6.283185307179586, 0., 1.\n0., 0.5") + step)
     track = next(s for s in found.arguments["supports"] if s.where == "RIGHT").amplitude
     assert track(0.25) == pytest.approx(3.0) and track(0.75) == pytest.approx(1.0)
+    cycle = "1, 6.2832, 0., 1.\n0., 0.5"  # 2 pi with few digits returns after a cycle all the same
+    cycles = step.replace("*STATIC", "*FATIGUE")
+    found = read(tmp_path, text.format("PERIODIC", cycle) + cycles)
+    track = next(s for s in found.arguments["supports"] if s.where == "RIGHT").amplitude
+    assert track(1.0) == pytest.approx(track(0.0), rel=1e-12)
+    assert any("6.2832 is taken as 6.283185307" in line for line in found.report.replaced)
     refused(tmp_path, text.format("DECAY", "1.") + step, "DEFINITION=DECAY is not available")
     bad = text.format("TABULAR", "0., 0., 0., 1.") + step
     refused(tmp_path, bad, "times must increase")

@@ -210,7 +210,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_a_specimen_and_its_scene_in_python(tmp_path, name):
     case = CASES[name]
-    deck = fx.read_deck(write(tmp_path, case.text()))
+    deck = fx.read_deck(write(tmp_path, case.text()), order=1)
     bond = fx.Interface(
         "Slave Face", "master_face", bonded=lambda x: x[0] > 19.0, contact=True, name="Slave Face",
         **case.interface,
@@ -338,7 +338,7 @@ RF3, U3
 
 
 def test_solid_arms_by_parts_in_two_steps(tmp_path):
-    deck = fx.read_deck(write(tmp_path, PARTS))
+    deck = fx.read_deck(write(tmp_path, PARTS), order=1)
     assert deck.steps[0].grow == () and deck.steps[1].grow == ("Upper.Face",)
     moves = fx.Amplitude((0.0, 1.0, 2.0), (0.0, 0.1, 1.0))
     bond = fx.Interface(

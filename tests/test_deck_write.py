@@ -186,6 +186,10 @@ def test_large_rotations_friction_and_ties(tmp_path):
         ({"step": fx.Cycles(maximum=1.0, ratio=0.1)}, "without a period that begins at time 0"),
         ({"criterion": fx.VCCT(0.2, method="closure")}, "method='closure'"),
         ({"release": fx.ProgressiveRelease()}, "the release law ProgressiveRelease"),
+        (
+            {"criterion": fx.EnhancedVCCT(GIc=lambda x: 0.2 + 0.0 * x[0], GIc_p=0.1)},
+            "toughness of EnhancedVCCT as a function",
+        ),
         ({"supports": [fx.Coupling("end_upper", (0.0, 0.0), x=1.0, mean=True)]}, "mean motion"),
         (
             {"supports": [fx.Equation((("pin_top", "x", 1.0), ("pin_bottom", "x", 1.0)), 1.0)]},

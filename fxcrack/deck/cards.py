@@ -292,6 +292,25 @@ class Card:
         return np.array(values)
 
 
+def fresh_cards(cards: Sequence[Card]) -> list[Card]:
+    """Cards with OP=NEW among those of one keyword in a step, which take away what was before.
+
+    All cards must have it, but for those that follow cards without data: they take all away, and
+    what follows is added.
+
+    Raises:
+        DeckError: Some have it and others do not.
+    """
+    fresh = [card for card in cards if card.choose("OP", ("MOD", "NEW"), "MOD") == "NEW"]
+    others = [card for card in cards if card not in fresh]
+    first = list(cards[: len(fresh)]) == fresh and not any(card.lines for card in fresh)
+    if fresh and others and not first:
+        others[0].fail(
+            f"OP=NEW on another {others[0].title} of the step asks for it on all of them"
+        )
+    return fresh
+
+
 def whole_numbers(card: Card, values: Array, what: str) -> Ints:
     """Numbers of a card as positive whole ones.
 

@@ -17,6 +17,7 @@ from fxcrack.criteria import (
 )
 from fxcrack.criteria.energy_release import RateCriterion
 from fxcrack.deck.cards import Card, Row, key, label
+from fxcrack.deck.crack_lengths import joined_lengths
 from fxcrack.deck.everywhere import Everywhere
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.fracture import NodalRates, read_criterion
@@ -31,6 +32,7 @@ from fxcrack.deck.report import Report
 from fxcrack.deck.rigid_surfaces import RigidSurfaces, Surface
 from fxcrack.deck.supports import Boundary
 from fxcrack.deck.ties import pairing_of, tie
+from fxcrack.deck.tracks import Period
 from fxcrack.interface.definition import Interface
 from fxcrack.interface.rigid import RIGID
 from fxcrack.steps.debond import Debond
@@ -281,7 +283,7 @@ class Contacts:
                 bonds.append(pair.interface)
                 continue
             rubs = any(self._friction(p, interactions) is not None for p in self.pairs)
-            debonds.append(self._debond(pair, rubs=rubs))
+            debonds.append(self._debond(pair, boundary.periods, rubs=rubs))
             held = np.intersect1d(slave_nodes(pair, self._flat), supported)
             if len(held):
                 log.warn(
@@ -444,12 +446,12 @@ class Contacts:
         note_thickness(family, self._flat, self._report)
         return friction(family)
 
-    def _debond(self, pair: PairDef, *, rubs: bool) -> Debond:
+    def _debond(self, pair: PairDef, periods: Sequence[Period], *, rubs: bool) -> Debond:
         assert pair.interface is not None
         _, card, criterion_card = pair.debonds[0]
         if not pair.parts:
             check_alike(pair)
-        criterion = self._criterion(pair)
+        criterion = self._criterion(pair, periods)
         if self._flat.kind.gdim == 3 and not isinstance(criterion, RateCriterion):
             self._report.replace(
                 "this criterion is for 2-D in other programs; it is used on the 3-D front",
@@ -475,12 +477,15 @@ class Contacts:
         except InputError as error:
             criterion_card.fail(str(error))
 
-    def _criterion(self, pair: PairDef) -> Criterion:
+    def _criterion(self, pair: PairDef, periods: Sequence[Period]) -> Criterion:
         """The criterion of a pair; of joined ones that of all of them."""
         if pair.parts:
-            return joined_criterion(pair, self._flat, self._criterion)
+            return joined_criterion(pair, self._flat, lambda p: self._criterion(p, periods))
+        card = pair.debonds[0][2]
+        if card.word("TYPE") == "CRACKLENGTH":
+            card = joined_lengths([(n, c) for n, _, c in pair.debonds], periods)
         return read_criterion(
-            pair.debonds[0][2],
+            card,
             self._flat,
             self._groups,
             self._nodal,

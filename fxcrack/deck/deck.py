@@ -134,8 +134,10 @@ def read_deck(
     Args:
         path: The deck; it and the files it includes are opened on rank 0 only.
         comm: Communicator of the scene.
-        order: 2 raises first-order elements to the second order; by default they stay what they
-            are. Nodes added between two nodes of a set belong to it where it is held.
+        order: 2 raises first-order elements to the second order, 1 leaves them what they are. By
+            default those are raised that would lock in place of reduced integration or incompatible
+            modes, and continuum shells. Nodes added between two nodes of a set belong to it where
+            it is held.
 
     Raises:
         DeckError: The deck cannot be read, or asks for what fxcrack does not have.

@@ -12,6 +12,7 @@ from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, DeckError, key
 from fxcrack.deck.element_checks import one_kind, repetitions
 from fxcrack.deck.elements import face_nodes, to_dolfinx
+from fxcrack.deck.markers import nodes_of_markers
 from fxcrack.deck.model import Model
 from fxcrack.deck.numbering import number_spaces
 from fxcrack.deck.raising import raise_order
@@ -126,7 +127,7 @@ class Flat:
                 at = self._existing(found, labels, at, "nodes") + placed.first_node
             else:
                 at = placed.cell_of(labels)
-                keep = (at >= 0) | ~np.isin(labels, placed.space.rigid_labels)
+                keep = (at >= 0) | ~np.isin(labels, placed.space.labels_without_cells)
                 labels, at = labels[keep], at[keep]
                 at = self._existing(found, labels, at, "elements")
             out.append(at)
@@ -171,22 +172,28 @@ class Flat:
         try:
             found = self._resolve(card, name, "nsets", index)
         except DeckError:
-            cells = self._cells_of_name(card, name)
+            cells, marked = self._cells_of_name(card, name)
             if cells is None:
                 raise
             self._warn_once(
                 f"{card.place}: there is no node set '{name}'; the nodes of the element set of "
                 "this name are meant"
             )
-            return distinct(self.cells[cells].ravel())
+            return distinct(np.concatenate((self.cells[cells].ravel(), marked)))
         return self._of_set(*found, "nsets")
 
-    def _cells_of_name(self, card: Card, name: str) -> Ints | None:
-        """Cells of an element set, ``None`` where there is none."""
+    def _cells_of_name(self, card: Card, name: str) -> tuple[Ints | None, Ints]:
+        """Cells of an element set, ``None`` where there is none, and nodes of its marks."""
+        marked = np.zeros(0, dtype=np.int64)
         try:
-            return self._of_set(*self._resolve(card, name, "elsets", None), "elsets")
+            place, found = self._resolve(card, name, "elsets", None)
         except DeckError:
-            return None
+            return None, marked
+        for inside, labels in found.members.items():
+            placed = self.placed[inside or place]
+            at = placed.space.nodes.find(nodes_of_markers(placed.space, labels))
+            marked = np.concatenate((marked, at[at >= 0] + placed.first_node))
+        return self._of_set(place, found, "elsets"), marked
 
     def ordered_nodes(self, card: Card, name: str, index: int | None = None) -> Ints:
         """As :meth:`nodes`, in the order of their numbers, or of the deck in UNSORTED sets."""

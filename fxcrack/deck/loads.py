@@ -19,7 +19,7 @@ from fxcrack.continuum.loads import (
     Pressure,
     Traction,
 )
-from fxcrack.deck.cards import Card, Row, key, label, squeeze
+from fxcrack.deck.cards import Card, Row, fresh_cards, key, label, squeeze
 from fxcrack.deck.constraints import Carrier
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
@@ -107,10 +107,7 @@ class Loads:
         moved: set[tuple[str, ...]] = set()
         for kind in _KINDS:
             chosen = [card for card in cards if card.keyword == kind]
-            fresh = [c for c in chosen if c.choose("OP", ("MOD", "NEW"), "MOD") == "NEW"]
-            if fresh and len(fresh) < len(chosen):
-                others = next(c for c in chosen if c not in fresh)
-                others.fail(f"OP=NEW on another *{kind} of the step asks for it on all of them")
+            fresh = fresh_cards(chosen)
             if fresh:
                 for mark, entry in self._entries.items():
                     if entry.kind == kind:
@@ -302,12 +299,13 @@ class Loads:
         """
         out: list[Load] = []
         titles: set[str] = set()
+        forces = self._forces(groups, titles)
         for entry in self._entries.values():
             if entry.kind != "CLOAD" and not entry.track.zero:
                 out += self._of(entry, groups, densities, titles)
-        return self._forces(groups) + out
+        return forces + out
 
-    def _forces(self, groups: Groups) -> list[Load]:
+    def _forces(self, groups: Groups, titles: set[str]) -> list[Load]:
         """Concentrated forces: one load for all components of a set that follow one amplitude."""
         found: dict[tuple[str, str], tuple[LoadEntry, AmplitudeLike, Array]] = {}
         for entry in self._entries.values():
@@ -322,18 +320,19 @@ class Loads:
             nodes = self._flat.nodes(entry.row.card, name, entry.row.index)
             if len(nodes) == 1 and int(nodes[0]) in self._carriers:
                 carrier = self._carriers[int(nodes[0])]
-                out.append(self._distribute(carrier, entry, amplitude, force, groups))
+                title = _new(name, titles)
+                out.append(self._distribute(carrier, entry, amplitude, force, groups, title))
                 continue
             where = groups.nodes(name, nodes, words="nodes of the deck")
             alone = sum(1 for other, _ in found if other == name) == 1
             if self._transforms.turned[nodes].any():
                 axes = "".join("123456"[i] for i in np.flatnonzero(force))
-                title = name if alone else f"{name}.{axes}"
+                title = _new(name if alone else f"{name}.{axes}", titles)
                 out.append(self._along_own_axes(entry, amplitude, force, nodes, where, title))
                 continue
             moment, force = force[3:], force[: self._flat.kind.gdim]
             axes = "".join("xyz"[i] for i in np.flatnonzero(force))
-            title = name if alone else f"{name}.{axes}"
+            title = _new(name if alone else f"{name}.{axes}", titles)
             if axes:
                 total = tuple((force * len(nodes)).tolist())
                 out.append(PointForce(where, total, amplitude, title))
@@ -349,6 +348,7 @@ class Loads:
         amplitude: AmplitudeLike,
         load: Array,
         groups: Groups,
+        title: str,
     ) -> Load:
         """A load on the reference node as forces on the nodes of its surface."""
         flat, gdim = self._flat, self._flat.kind.gdim
@@ -362,7 +362,7 @@ class Loads:
         forces = carrier.forces(entry.row, force, moment, gdim) * len(carrier.nodes)
         where = groups.nodes(carrier.name, carrier.nodes, words="coupling")
         x = flat.points[carrier.nodes][:, :gdim]
-        return PointForce(where, _fields(x, forces), amplitude, entry.name)
+        return PointForce(where, _fields(x, forces), amplitude, title)
 
     def _along_own_axes(
         self, entry: LoadEntry, amplitude: AmplitudeLike, load: Array, nodes: Ints, where: str,
@@ -389,11 +389,7 @@ class Loads:
         flat, gdim, card = self._flat, self._flat.kind.gdim, entry.row.card
 
         def title(name: str) -> str:
-            new, i = name, 2
-            while new in titles:
-                new, i = f"{name} {i}", i + 1
-            titles.add(new)
-            return new
+            return _new(name, titles)
 
         if entry.kind == "DSLOAD":
             where = groups.surface(card, entry.name, entry.row.index)
@@ -464,6 +460,15 @@ class Loads:
             field = Hydrostatic(value, axis, *entry.zero)
             return Pressure(where, field, amplitude, name, entry.follows)
         return Pressure(where, value, amplitude, name, entry.follows)
+
+
+def _new(name: str, titles: set[str]) -> str:
+    """A name that no other load has, noted among those that are taken."""
+    new, i = name, 2
+    while new in titles:
+        new, i = f"{name} {i}", i + 1
+    titles.add(new)
+    return new
 
 
 def _fields(x: Array, forces: Array) -> tuple[Field, ...]:

@@ -4,10 +4,54 @@ from __future__ import annotations
 
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.report import Report
-from fxcrack.deck.thickness import thickness_of
+from fxcrack.deck.spaces import Elements
+from fxcrack.deck.thickness import Thickness, thickness_of
 
 _MATTERS = 0.01
 """Excess of the bending stiffness from which it is said of elements that the deck itself has."""
+_TOO_STIFF = 0.05
+"""Excess from which elements in place of others that bend freely are raised."""
+_MOST = 50_000
+"""Nodes up to which a mesh is raised unasked: beyond, its factorisation would surprise."""
+
+
+def raised_to_bend(flat: Flat, report: Report) -> bool:
+    """Whether the elements are to be raised to the second order to bend as those of the deck do.
+
+    So it is where reduced integration or incompatible modes let elements of first order bend
+    without locking, and those of full integration in their place would be 5 % too stiff or more.
+
+    Args:
+        flat: The model with the elements as the deck gives them.
+        report: Takes what is said.
+    """
+    replaced = [b for b in _blocks(flat) if b.kind.bends_freely]
+    if flat.kind.order != 1 or not replaced:
+        return False
+    found = thickness_of(flat.kind.cell, flat.points, flat.cells)
+    dimension = 2 if flat.kind.tdim == 2 else 3
+    if found is None or found.excess < _TOO_STIFF or len(flat.points) * 2**dimension > _MOST:
+        return False
+    names = ", ".join(sorted({block.kind.name for block in replaced}))
+    report.replace(
+        f"{names} elements bend without locking; those of first order and full integration in "
+        f"their place would be too stiff by about {100.0 * found.excess:.2g} % with "
+        f"{_elements(found)} over the smallest dimension of the bodies, so all elements of the "
+        "deck are raised to the second order (read_deck(..., order=1) or --order 1: they are not)",
+        replaced[0].card,
+    )
+    return True
+
+
+def _blocks(flat: Flat) -> list[Elements]:
+    """Elements that are no shells."""
+    spaces = [flat.model.root, *flat.model.instances.values()]
+    blocks = [b for space in spaces for b in space.elements.values() if len(b.table.labels)]
+    return [b for b in blocks if not (b.kind.stacked or b.kind.shell)]
+
+
+def _elements(found: Thickness) -> str:
+    return f"{found.number} element" + ("s" if found.number > 1 else "")
 
 
 def warn_of_locking(flat: Flat, report: Report, *, explicit: bool, bonded: bool) -> None:
@@ -22,13 +66,7 @@ def warn_of_locking(flat: Flat, report: Report, *, explicit: bool, bonded: bool)
         explicit: Whether the steps are explicit.
         bonded: Whether an interface bonds bodies.
     """
-    spaces = [flat.model.root, *flat.model.instances.values()]
-    blocks = [
-        b
-        for space in spaces
-        for b in space.elements.values()
-        if not (b.kind.stacked or b.kind.shell) and len(b.table.labels)
-    ]
+    blocks = _blocks(flat)
     replaced = [b for b in blocks if b.kind.bends_freely]
     if flat.kind.order != 1 or not blocks or not (replaced or bonded):
         return
@@ -37,10 +75,10 @@ def warn_of_locking(flat: Flat, report: Report, *, explicit: bool, bonded: bool)
         return
     known = ""
     if found is not None:
-        elements = f"{found.number} element" + ("s" if found.number > 1 else "")
         known = (
-            f": with {elements} over the smallest dimension of the bodies, {found.aspect:.3g} "
-            f"times as long as high, by about {100.0 * found.excess:.2g} % (rectangles, nu = 0.3)"
+            f": with {_elements(found)} over the smallest dimension of the bodies, "
+            f"{found.aspect:.3g} times as long as high, by about {100.0 * found.excess:.2g} % "
+            "(rectangles, nu = 0.3)"
         )
     help_ = (
         "explicit dynamics has no second order: mesh the thickness with more elements"
@@ -62,4 +100,4 @@ def warn_of_locking(flat: Flat, report: Report, *, explicit: bool, bonded: bool)
         )
 
 
-__all__ = ["warn_of_locking"]
+__all__ = ["raised_to_bend", "warn_of_locking"]

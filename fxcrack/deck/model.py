@@ -23,8 +23,9 @@ from fxcrack.deck.generators import (
     generate_nodes,
 )
 from fxcrack.deck.left_out import OF_INTERACTIONS, OF_MATERIALS
+from fxcrack.deck.markers import marker_nodes, nodes_of_markers, sort_out_markers
 from fxcrack.deck.report import Report
-from fxcrack.deck.spaces import HOME, Elements, Numbered, Space, SurfaceDef
+from fxcrack.deck.spaces import HOME, Elements, Markers, Numbered, Space, SurfaceDef
 
 _GENERATORS = {
     "NGEN": generate_nodes,
@@ -115,6 +116,7 @@ class _Walk:
         self._resolve_early()
         if self._space is not self._model.root:
             cards[-1].fail(f"the part or instance '{self._space.name}' never ends")
+        sort_out_markers([self._model.root, *self._model.instances.values()], self._report)
         return self._model
 
     def _resolve_early(self) -> None:
@@ -207,6 +209,11 @@ class _Walk:
             card.fail(f"there is no part '{part}'{meant}; define it before its instance")
         space = self._model.parts[key(part)].instance(name)
         rows = card.rows()
+        if rows and len(rows[0]) > 3:
+            rows[0].fail(
+                "the first line is the translation, three numbers; write 0., 0., 0. before the "
+                "line of the rotation"
+            )
         if rows:
             space.shift = np.array([rows[0].number(i, 0.0) for i in range(3)])
         if len(rows) > 1:
@@ -291,6 +298,13 @@ class _Walk:
         kind = element_type(name)
         if isinstance(kind, str):
             line = f"{card.place}: element type {name} is refused: {kind}"
+            n_nodes = marker_nodes(name)
+            if n_nodes is not None:  # a body only where a section names it
+                table = self._element_table(card, name, n_nodes)
+                marks = Markers(card, line, Numbered(n_nodes))
+                marks = self._space.markers.setdefault(name, marks)
+                marks.table.add(table[:, 0], table[:, 1:])
+                return
             self._report.refused.append(line)
             if card.has("ELSET"):
                 self._space.add_to_set(
@@ -340,6 +354,8 @@ class _Walk:
                 at = block.table.find(labels)
                 nodes = np.unique(block.table.rows[at[at >= 0]]).astype(np.int64)
                 self._space.add_to_set(card, "nsets", name, nodes, space=place)
+            nodes = nodes_of_markers(space, labels)
+            self._space.add_to_set(card, "nsets", name, nodes, space=place)
 
     def _set(self, card: Card, kind: str, name: str) -> None:
         place = HOME

@@ -61,8 +61,10 @@ def check_alike(pair: PairDef) -> None:
         DeckError: It does.
     """
     _, card, criterion_card = pair.debonds[0]
+    by_steps = criterion_card.word("TYPE") == "CRACKLENGTH"  # joined to one curve
     for _, other, of_other in pair.debonds[1:]:
-        if of_other.options != criterion_card.options or of_other.lines != criterion_card.lines:
+        alike = by_steps or of_other.lines == criterion_card.lines
+        if of_other.options != criterion_card.options or not alike:
             of_other.fail(
                 f"the pair has another criterion before ({criterion_card.place}); a pair has "
                 "one criterion in all steps"

@@ -144,6 +144,21 @@ class Elements:
 
 
 @dataclass
+class Markers:
+    """Elements of one type that are no bodies: they mark lines and surfaces of the mesh.
+
+    Attributes:
+        card: The card that defined the first.
+        refusal: Why the type is refused where it is meant as a body; empty where it has a word.
+        table: Numbers and nodes (by number), one row each.
+    """
+
+    card: Card
+    refusal: str
+    table: Numbered
+
+
+@dataclass
 class NamedSet:
     """A set of nodes or elements.
 
@@ -195,6 +210,7 @@ class Space:
         nodes: Coordinates by number, shape (n, 3).
         elements: Elements by type.
         rigid: Nodes of rigid elements by type.
+        markers: Elements that only mark parts of the mesh by type.
         nsets: Sets of nodes by key.
         elsets: Sets of elements by key.
         surfaces: By key.
@@ -210,6 +226,7 @@ class Space:
     nodes: Numbered = field(default_factory=lambda: Numbered(3))
     elements: dict[str, Elements] = field(default_factory=dict)
     rigid: dict[str, Numbered] = field(default_factory=dict)
+    markers: dict[str, Markers] = field(default_factory=dict)
     nsets: dict[str, NamedSet] = field(default_factory=dict)
     elsets: dict[str, NamedSet] = field(default_factory=dict)
     surfaces: dict[str, SurfaceDef] = field(default_factory=dict)
@@ -227,6 +244,7 @@ class Space:
             self.nodes.copy(),
             {k: Elements(e.kind, e.table.copy(), e.card) for k, e in self.elements.items()},
             {k: table.copy() for k, table in self.rigid.items()},
+            {k: Markers(m.card, m.refusal, m.table.copy()) for k, m in self.markers.items()},
             {k: NamedSet(s.name, dict(s.members), s.card, s.internal)
              for k, s in self.nsets.items()},
             {k: NamedSet(s.name, dict(s.members), s.card, s.internal)
@@ -247,6 +265,12 @@ class Space:
         """Numbers of all rigid elements, ascending, shape (n,)."""
         parts = [table.labels for table in self.rigid.values()]
         return distinct(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
+
+    @property
+    def labels_without_cells(self) -> Ints:
+        """Numbers of the elements that become no cells, ascending, shape (n,)."""
+        parts = [self.rigid_labels, *(m.table.labels for m in self.markers.values())]
+        return distinct(np.concatenate(parts))
 
     def add_to_set(
         self, card: Card, kind: str, name: str, labels: Ints, *, space: str = HOME

@@ -16,7 +16,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.continuum.couplings import Constraint
 from fxcrack.continuum.loads import Displacement
 from fxcrack.continuum.node_supports import Rotation, Support, Symmetry
-from fxcrack.deck.cards import Card, Row, label
+from fxcrack.deck.cards import Card, Row, fresh_cards, label
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.tracks import Amplitudes, Curve, Period, Track, combined
@@ -123,11 +123,8 @@ class Boundary:
         Raises:
             DeckError: A line cannot be read.
         """
-        fresh = [card for card in cards if card.choose("OP", ("MOD", "NEW"), "MOD") == "NEW"]
+        fresh = fresh_cards(cards)
         if fresh:
-            others = [card for card in cards if card not in fresh]
-            if others:
-                others[0].fail("OP=NEW on another *BOUNDARY of the step asks for it on all of them")
             self._now[:] = -1
         for card in cards:
             kind = card.word("TYPE", "DISPLACEMENT")

@@ -23,6 +23,8 @@ _PER_PERIOD = 64
 """Straight pieces of one period of the highest harmonic."""
 _JUMP = 1e-6
 """Part of a step over which a value that jumps at its beginning moves there."""
+_NEAR = 1e-3
+"""Part by which a circular frequency may miss that of whole periods in a cycle."""
 _SAME = 1e-12
 
 
@@ -109,12 +111,16 @@ class Amplitudes:
         model: The deck.
         report: Takes what is replaced.
         end: Total time of the last step's end.
+        cycles: Times of one cycle of the steps of cycles.
     """
 
-    def __init__(self, model: Model, report: Report, end: float) -> None:
+    def __init__(
+        self, model: Model, report: Report, end: float, cycles: Sequence[float] = ()
+    ) -> None:
         self._cards = model.amplitudes
         self._report = report
         self._end = end
+        self._cycles = cycles
         self._known: dict[str, Curve] = {}
 
     def of(self, card: Card) -> Curve | None:
@@ -179,6 +185,7 @@ class Amplitudes:
         terms = np.array([x for row in rows[1:] for x in row.numbers()])
         if n < 1 or len(terms) != 2 * n or omega <= 0.0:
             card.fail(f"{n} terms with a positive frequency need {2 * n} coefficients A, B")
+        omega = self._whole_periods(card, omega)
         pieces = max(1.0, (self._end - begin) * omega * n / (2.0 * np.pi)) * _PER_PERIOD
         if pieces > 1e6:
             card.fail("the amplitude has more than a million corners over the steps")
@@ -191,6 +198,24 @@ class Amplitudes:
         if begin > 0.0:
             times, values = np.append(0.0, times), np.append(base, values)
         return times, values
+
+    def _whole_periods(self, card: Card, omega: float) -> float:
+        """The circular frequency with which a cycle has whole periods, if the given one is near.
+
+        Decks give 2 pi with a few digits, and an amplitude that does not return exactly after the
+        time of a cycle is none of a cycle.
+        """
+        for time in self._cycles:
+            n = round(omega * time / (2.0 * np.pi))
+            exact = 2.0 * np.pi * n / time
+            if n >= 1 and 0.0 < abs(exact - omega) <= _NEAR * omega:
+                self._report.replace(
+                    f"the circular frequency {omega:.10g} is taken as {exact:.10g}, with which the "
+                    f"amplitude returns after the time {time:g} of a cycle",
+                    card,
+                )
+                return exact
+        return omega
 
 
 @dataclass

@@ -19,7 +19,7 @@ from fxcrack.deck.general_contact import GENERAL
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.initial_stress import InitialStress
 from fxcrack.deck.loads import Loads
-from fxcrack.deck.locking import warn_of_locking
+from fxcrack.deck.locking import raised_to_bend, warn_of_locking
 from fxcrack.deck.model import Family, Model
 from fxcrack.deck.procedures import DeckStep, Procedure, read_procedures
 from fxcrack.deck.properties import Sections, read_sections
@@ -102,6 +102,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     procedures = read_procedures(model.steps, report)
     explicit = bool(procedures) and isinstance(procedures[0].step, Explicit)
     flat = Flat(model, _order(model, report, order, explicit=explicit))
+    if order is None and not explicit and raised_to_bend(flat, report):
+        flat = Flat(model, 2)
     if flat.kind.shell:
         check_normals(flat)
     groups = Groups(flat)
@@ -109,7 +111,8 @@ def translate(model: Model, report: Report, order: int | None = None) -> Transla
     _check_steps(model.steps, explicit=explicit)
     finite = _finite(model, procedures, report)
     periods = [p.period for p in procedures]
-    amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0)
+    cycles = [p.period.end - p.period.start for p in procedures if isinstance(p.step, Cycles)]
+    amplitudes = Amplitudes(model, report, periods[-1].end if periods else 1.0, cycles)
     boundary = Boundary(flat, periods)
     boundary.take([c for c in cards if c.keyword == "BOUNDARY"], amplitudes)
     constraints = read_constraints(cards, flat)

@@ -10,6 +10,7 @@ from fxcrack.criteria import (
     CrackLengthVsTime,
     CrackOpening,
     CriticalStress,
+    EnhancedVCCT,
     Fatigue,
     ProgressiveRelease,
     RampRelease,
@@ -38,6 +39,8 @@ def debond_lines(debond: Debond, step: Step, pairs: Sequence[Pair], *, nodal: bo
     title = debond.interface.title
     head = f'*DEBOND, SLAVE="{title}", MASTER="{title} master", FREQUENCY=1'
     lines: list[str] = []
+    if nodal and isinstance(debond.criterion, EnhancedVCCT):
+        refuse(f"interface '{title}': toughness of EnhancedVCCT as a function of position")
     old = isinstance(debond.criterion, CriticalStress | CrackOpening | CrackLengthVsTime)
     release = choose_release(debond, step, pairs).law
     if isinstance(release, ProgressiveRelease) and not debond.release_chosen:
