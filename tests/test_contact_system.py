@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 
 from fxcrack.base.errors import ConvergenceError
 from fxcrack.equilibrium import growing_cholesky, jump_system
+from fxcrack.equilibrium.cohesive_law import CohesiveBond
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium, bond_work, work_between
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 
@@ -358,3 +359,70 @@ def test_rates_are_differences_of_equilibria(seed: int, n_retained: int) -> None
     scale = np.abs(a.jump).max() + np.abs(b.jump).max()
     assert b.jump - a.jump == pytest.approx(jump, abs=ROUND_OFF * scale)
     assert b.conjugate - a.conjugate == pytest.approx(conjugate, abs=ROUND_OFF * scale)
+
+
+# -- contact of bonds that soften ------------------------------------------------------------------
+
+
+def softening(seed: int, mixed: float) -> tuple[Structure, ContactSystem, CohesiveBond]:
+    """Two open nodes in contact, and one whose bond softens in mixed mode; normals are 0, 2, 4."""
+    structure = Structure.random(6, seed)
+    system = structure.system()
+    system.soft_contact = True
+    system.release(np.arange(4))
+    system.contact[[0, 2, 4]] = system.touches[4] = True
+    direction = np.array([np.sin(mixed), np.cos(mixed)])
+    # so slow that nothing is unstable: the smallest stiffness of the structure is 1e-3
+    bond = CohesiveBond(
+        np.array([4, 5]), direction, 1e-2, 50.0, (0, np.array([2, 2]), np.arange(2))
+    )
+    system.soften([bond])
+    return structure, system, bond
+
+
+@settings(max_examples=40)
+@given(
+    st.integers(0, 10_000),
+    st.sampled_from([0.1, 0.8, 1.5]),
+    st.lists(st.floats(-1.0, 1.0), min_size=4, max_size=4),
+)
+def test_contact_holds_faces_whose_bond_softens(
+    seed: int, mixed: float, loads: list[float]
+) -> None:
+    """Conditions of optimality on K: the bond pulls by its law, contact pushes beside it."""
+    structure, system, bond = softening(seed, mixed)
+    force = np.zeros(6)
+    state = system.equilibrium(np.array(loads), force)
+    acting = structure.interface_forces(state)
+    by_bond = -bond.force(bond.opening(state.jump)) * bond.direction
+    size = 1.0 + np.abs(structure.k).sum(axis=1)[N_INNER : N_INNER + 6] @ np.abs(state.jump)
+    pressure = acting.copy()
+    pressure[4:] -= by_bond
+    normals = np.array([0, 2, 4])
+    assert np.abs(pressure[[1, 3, 5]]).max() < ROUND_OFF * size
+    assert pressure[normals].min() > -ROUND_OFF * size
+    assert state.jump[normals].min() > -ROUND_OFF * size
+    assert np.abs(pressure * state.jump)[normals].max() < ROUND_OFF * size**2
+    assert state.force[4:] == pytest.approx(by_bond, abs=ROUND_OFF * size)
+    assert system.pressure(state, normals) == pytest.approx(pressure[normals], abs=ROUND_OFF * size)
+    # in rates, and once the bond is gone, what is closed stays closed
+    jump, _ = system.rates(np.ones(4), force)
+    assert not jump[system.closed].any()
+    closed = system.closed.copy()
+    system.finish([bond])
+    assert np.array_equal(system.closed, closed) and not system.free[closed].any()
+    assert system.free[[1, 3, 5]].all()
+
+
+def test_a_bond_runs_open_along_faces_that_contact_holds() -> None:
+    """Unstable as it may slide, stable where it is held in both directions."""
+    structure, system, bond = softening(3, 0.8)
+    bond.final = 1e-3  # softens much faster than the bodies unload
+    system.closed[4] = True
+    assert not system.soft.stable(system.soft_held)
+    assert system.soft.stable(np.array([True, True]))
+    end = system.pass_unstable(Equilibrium(np.zeros(4), np.zeros(6), np.zeros(6), np.zeros(4)))
+    assert not system.soft.bonds and system.closed[4] and not system.free[4]
+    assert end.jump[4] == 0.0
+    acting = structure.interface_forces(end)
+    assert np.abs(acting[[0, 1, 2, 3, 5]]).max() < ROUND_OFF

@@ -6,7 +6,7 @@ With the free jumps condensed out, the softening ones obey a small system
 
 B the (negative) stiffness of the bonds. Where S* - B is not positive definite the state is
 unstable, or neutral; the bonds then open unstably, to the next minimum of the energy along their
-branches.
+branches. Components whose faces are in contact keep their jump: the system is that of the others.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.equilibrium.cohesive_law import NEUTRAL, STIFFEST, CohesiveBond
 from fxcrack.equilibrium.growing_cholesky import GrowingCholesky
 from fxcrack.equilibrium.snap_through import snap_through
@@ -24,6 +24,8 @@ _LOOSE = 1e-12
 """Stiffness below this fraction of that of the bodies at the nodes is round-off."""
 _EVENT = 1e-10
 """Openings within this fraction of the final one count as equal."""
+_ALONG = 1e-12
+"""Bonds of whose direction no more than this part (of its square) is left to move are held."""
 
 
 @dataclass
@@ -119,7 +121,7 @@ class CohesiveBonds:
         """Y, shape (n_free, r)."""
         return self._forward
 
-    def _laws(self, faster: float = 0.0) -> tuple[Array, Array]:
+    def laws(self, faster: float = 0.0) -> tuple[Array, Array]:
         """Forces at zero opening c, shape (r,), force, and stiffness B, shape (r, r), force/length.
 
         Args:
@@ -140,22 +142,52 @@ class CohesiveBonds:
             i = j
         return constant, stiffness
 
-    def solve(self, right: Array) -> Array:
-        """Jumps (length) for given -g* (force), branches as they are, both of shape (r,)."""
+    def solve(self, right: Array, jump: Array, held: Bools) -> tuple[Array, Array]:
+        """Jumps and forces of the bonds, branches as they are.
+
+        Args:
+            right: -g*, with what the jumps of held components contribute, shape (r,), force.
+            jump: Jumps of the held components, shape (r,), length; others are not read.
+            held: Components that contact holds, shape (r,).
+
+        Returns:
+            Jumps (length) and forces of the bonds alone on the slave side, both of shape (r,).
+        """
         self.counts.solves += 1
-        constant, stiffness = self._laws()
-        return np.asarray(np.linalg.solve(self.star - stiffness, constant + right))
+        constant, stiffness = self.laws()
+        if not held.any():
+            found = np.linalg.solve(self.star - stiffness, constant + right)
+            return np.asarray(found), constant + stiffness @ found
+        found, moves = np.where(held, jump, 0.0), ~held
+        right = (constant + right + stiffness @ found)[moves]
+        found[moves] = np.linalg.solve((self.star - stiffness)[np.ix_(moves, moves)], right)
+        return found, constant + stiffness @ found
 
-    def rates(self, right: Array) -> Array:
-        """Rates of the jumps for given rates of -g*, branches as they are, both of shape (r,)."""
-        _, stiffness = self._laws()
-        return np.asarray(np.linalg.solve(self.star - stiffness, right))
+    def rates(self, right: Array, held: Bools) -> Array:
+        """Rates of the jumps for given rates of -g*, branches as they are.
 
-    def stable(self) -> bool:
-        """Whether S* - B is positive definite, and not just so."""
-        _, stiffness = self._laws(NEUTRAL)
+        Args:
+            right: Rates of -g*, shape (r,).
+            held: Components that contact holds, shape (r,).
+
+        Returns:
+            Shape (r,), zero where contact holds.
+        """
+        _, stiffness = self.laws()
+        out, moves = np.zeros(len(right)), ~held
+        matrix = (self.star - stiffness)[np.ix_(moves, moves)]
+        out[moves] = np.linalg.solve(matrix, right[moves])
+        return out
+
+    def stable(self, held: Bools) -> bool:
+        """Whether S* - B is positive definite, and not just so.
+
+        Args:
+            held: Components that contact holds, shape (r,).
+        """
+        _, stiffness = self.laws(NEUTRAL)
         try:
-            np.linalg.cholesky(self.star - stiffness)
+            np.linalg.cholesky((self.star - stiffness)[np.ix_(~held, ~held)])
         except np.linalg.LinAlgError:
             return False
         return True
@@ -216,11 +248,12 @@ class CohesiveBonds:
 
     # -- passing an unstable state -------------------------------------------------------------
 
-    def snap(self, jump: Array, round_off: float | Array = 0.0) -> list[CohesiveBond]:
+    def snap(self, jump: Array, held: Bools, round_off: float | Array = 0.0) -> list[CohesiveBond]:
         """Descend in energy from an unstable equilibrium to a stable one at constant load.
 
         Args:
             jump: Softening jumps of the equilibrium, shape (r,), length.
+            held: Components that contact holds, shape (r,).
             round_off: That of the entries of S, a number or one per unknown, shape (n_last,),
                 force/length.
 
@@ -231,7 +264,7 @@ class CohesiveBonds:
             ComesApart: There is no minimum: nothing holds a body once bonds have opened.
         """
         self.counts.snaps += 1
-        directions, across = self._axes()
+        bonds, directions, across = self._axes(held)
         stiffness = directions @ self.star @ directions.T
         if len(across):
             # no force acts across the directions; what has no stiffness there restrains nothing
@@ -241,32 +274,52 @@ class CohesiveBonds:
         mine = self.components
         noise = np.broadcast_to(round_off, len(self._schur))[mine]
         least = float(np.maximum(_LOOSE * self._schur[mine, mine], noise).max())
-        strength = np.array([b.strength for b in self.bonds])
-        final = np.array([b.final for b in self.bonds])
-        w = directions @ jump
+        strength = np.array([b.strength for b in bonds])
+        final = np.array([b.final for b in bonds])
+        every = np.zeros(len(self._schur))
+        every[mine] = jump
+        w = np.array([b.opening(every) for b in bonds])
         largest = np.array([w_ if b.largest is None else b.largest
-                            for b, w_ in zip(self.bonds, w, strict=True)])  # fmt: skip
-        held = np.array([b.force(w_) for b, w_ in zip(self.bonds, w, strict=True)])
-        opens, largest, steps = snap_through(held, stiffness, least, strength, final, w, largest)
+                            for b, w_ in zip(bonds, w, strict=True)])  # fmt: skip
+        force = np.array([b.force(w_) for b, w_ in zip(bonds, w, strict=True)])
+        opens, largest, steps = snap_through(force, stiffness, least, strength, final, w, largest)
         self.counts.snap_steps += steps
         gone = []
-        for bond, on, most in zip(self.bonds, opens, largest, strict=True):
+        for bond, on, most in zip(bonds, opens, largest, strict=True):
             if most >= bond.final * (1.0 - 10.0 * _EVENT):
                 gone.append(bond)
             else:
                 bond.largest = None if on else float(most)
         return gone
 
-    def _axes(self) -> tuple[Array, Array]:
-        """Unit vectors along the openings, shape (n, r), and across them, shape (r - n, r)."""
-        along, across = [], []
+    def _axes(self, held: Bools) -> tuple[list[CohesiveBond], Array, Array]:
+        """How bonds may open.
+
+        Args:
+            held: Components that contact holds, shape (r,).
+
+        Returns:
+            The n bonds whose opening may change; the least motions that open them by one, shape
+            (n, r); an orthonormal basis of the motions that open none, shape (m, r).
+        """
+        bonds, along, across = [], [], []
         i, r = 0, len(self.components)
         for bond in self.bonds:
             k = len(bond.components)
-            whole = np.zeros((k, r))
-            whole[:, i : i + k] = np.linalg.qr(np.column_stack([bond.direction, np.eye(k)]))[0].T
-            whole[0, i : i + k] = bond.direction
-            along.append(whole[:1])
-            across.append(whole[1:])
+            moves = np.flatnonzero(~held[i : i + k])
+            direction = bond.direction[moves]
+            square = float(direction @ direction)
+            whole = np.zeros((len(moves), r))
+            if square > _ALONG:
+                basis = np.column_stack([direction, np.eye(len(moves))])
+                whole[:, i + moves] = np.linalg.qr(basis)[0].T
+                whole[0, i + moves] = direction / square
+                bonds.append(bond)
+                along.append(whole[:1])
+                across.append(whole[1:])
+            else:
+                whole[:, i + moves] = np.eye(len(moves))
+                across.append(whole)
             i += k
-        return np.concatenate(along), np.concatenate(across)
+        none = np.zeros((0, r))
+        return bonds, np.concatenate([none, *along]), np.concatenate([none, *across])

@@ -191,12 +191,26 @@ class ContactSystem(JumpSystem):
         return state
 
     def _least_squares(self, loads: Array, force: Array) -> Bools:
-        """Closed set by the dual problem min 1/2 p^t C p + g^t p, p >= 0, as a NNLS problem."""
-        normal = np.flatnonzero(self.contact)
-        every = np.union1d(self.cholesky.free, normal)
-        factor = cho_factor(self.schur[np.ix_(every, every)], lower=True)
+        """Closed set by the dual problem min 1/2 p^t C p + g^t p, p >= 0, as a NNLS problem.
+
+        Raises:
+            ConvergenceError: Bonds that soften leave no stable equilibrium with all faces open.
+        """
+        normal, soft = np.flatnonzero(self.contact), self.soft.components
+        every = np.union1d(np.union1d(self.cholesky.free, normal), soft)
+        stiffness, given = self.schur[np.ix_(every, every)], force[every]
+        if len(soft):
+            at = np.searchsorted(every, soft)
+            given[at], by_opening = self.soft.laws()
+            stiffness[np.ix_(at, at)] -= by_opening
+        try:
+            factor = cho_factor(stiffness, lower=True)
+        except np.linalg.LinAlgError as error:
+            raise ConvergenceError(
+                "contact: nodes keep changing between open and closed beside bonds that soften"
+            ) from error
         where = np.searchsorted(every, normal)
-        right = force[every] - self.schur[np.ix_(every, self.load_columns)] @ loads
+        right = given - self.schur[np.ix_(every, self.load_columns)] @ loads
         if self.offset is not None:
             right -= self.offset[every]
         gap = cho_solve(factor, right)[where] + self.gap[normal]
@@ -255,7 +269,7 @@ class ContactSystem(JumpSystem):
         here, last = 0.0, start
         stuck = done = 0
         while True:
-            if self.soft.bonds and not self.soft.stable():
+            if self.soft.bonds and not self.soft.stable(self.soft_held):
                 done += 1
                 if done > 4 * self.n_retained + 20:
                     raise ConvergenceError(

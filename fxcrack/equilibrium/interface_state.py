@@ -162,7 +162,8 @@ class InterfaceState:
             make_friction(system, pairs, fronts, index, self.states.friction)
         system.soft.finished = self.states.finished
         if bonds:
-            system.contact[soft] = False
+            if not system.soft_contact:
+                system.contact[soft] = False
             system.soften(bonds)
 
     # -- checkpoints ---------------------------------------------------------------------

@@ -84,6 +84,7 @@ class JumpSystem:
         closed: Normal components held by contact, shape (n_retained,).
         contact: Normal components that may be in contact now, shape (n_retained,).
         touches: Normal components that may be in contact once their bond is released, likewise.
+        soft_contact: Whether faces may touch while their bond softens; else once it is gone.
         gap: Initial gaps, shape (n_retained,), length.
         contact_steps: Number of active-set steps done, those on earlier sets of jumps included.
         seconds: Time spent following contact, friction or softening, by law.
@@ -111,6 +112,7 @@ class JumpSystem:
         self.closed = np.zeros(n_retained, dtype=bool)
         self.contact = np.zeros(n_retained, dtype=bool)
         self.touches = np.zeros(n_retained, dtype=bool)
+        self.soft_contact = False
         self.gap = np.zeros(n_retained)
         self.contact_steps = 0
         self.seconds: dict[str, float] = {}
@@ -206,7 +208,7 @@ class JumpSystem:
         self.soft.refresh(self.cholesky)
         self.soft.finished += sum(0.5 * b.strength * b.final for b in gone)
         free = np.concatenate([b.components for b in gone])
-        self.release(free)
+        self.release(free[~(self.closed[free] & self.soft_contact)])
         self.contact[free] |= self.touches[free]
 
     def snapshot(self) -> ComponentStates:
@@ -248,11 +250,19 @@ class JumpSystem:
             self.soft.refresh(self.cholesky)
         self._unit = None
 
+    @property
+    def soft_held(self) -> Bools:
+        """Which components of softening bonds contact holds, shape (r,)."""
+        return np.asarray(self.closed[self.soft.components] & self.soft_contact)
+
     def _switch(self, components: Ints) -> None:
         """Close the open ones among the components and open the closed ones."""
         opening = components[self.closed[components]]
         closing = components[~self.closed[components]]
         self.closed[opening], self.closed[closing] = False, True
+        if self.soft_contact:
+            # those of bonds that soften are not in the factor, open or closed
+            opening, closing = (np.setdiff1d(c, self.soft.components) for c in (opening, closing))
         if len(closing):
             self.hold(closing)
         if len(opening):
@@ -347,7 +357,7 @@ class JumpSystem:
             active = np.flatnonzero(jump)
             right = -self.schur[np.ix_(mine, active)] @ jump[active]
             right -= self.schur[np.ix_(mine, self.load_columns)] @ loads
-            soft = self.soft.rates(right)
+            soft = self.soft.rates(right, self.soft_held)
             jump[free] -= self.cholesky.backward(self.soft.coupling @ soft)
             jump[mine] = soft
         x = np.concatenate([jump, loads])
@@ -363,19 +373,23 @@ class JumpSystem:
 
     def _add_soft(self, jump: Array, loads: Array, force: Array) -> Array:
         """Add the softening jumps and what they open elsewhere; returns all given forces."""
-        mine = self.soft.components
-        soft = self.soft.solve(self._soft_right(jump, loads))
-        jump[self.cholesky.free] -= self.cholesky.backward(self.soft.coupling @ soft)
+        mine, held = self.soft.components, self.soft_held
+        soft, by_bonds = self.soft.solve(self._soft_right(jump, loads), jump[mine], held)
+        # what the held ones open elsewhere is there already
+        moved = np.where(held, 0.0, soft)
+        jump[self.cholesky.free] -= self.cholesky.backward(self.soft.coupling @ moved)
         jump[mine] = soft
         force = force.copy()
         # as they act on the bodies: a stiff branch times the round-off of an opening is much more
-        force[mine] = self._product(mine, np.concatenate([jump, loads]))
+        acting = self._product(mine, np.concatenate([jump, loads]))
+        force[mine] = np.where(held, by_bonds, acting)
         return force
 
     def pass_unstable(self, state: Equilibrium) -> Equilibrium:
         """Descend in energy from an unstable state to the next stable one, at constant load."""
         mine = self.soft.components
-        self.finish(self.soft.snap(state.jump[mine], self.cholesky.round_off))
+        round_off = self.cholesky.round_off
+        self.finish(self.soft.snap(state.jump[mine], self.soft_held, round_off))
         given = state.force.copy()
         given[mine] = 0.0
         return self.linear(state.loads, given)

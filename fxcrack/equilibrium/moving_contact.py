@@ -151,8 +151,12 @@ def known_forces(system: ContactSystem, here: Equilibrium, force: Array) -> Arra
         Shape (n_retained,), force.
     """
     given: Bools = system.knows_force()
-    given[system.soft.components] = False
-    return np.where(given, force, system.forces(here, np.arange(system.n_retained)))
+    soft = system.soft.components
+    given[soft] = False
+    out = np.where(given, force, system.forces(here, np.arange(system.n_retained)))
+    touching = soft[system.closed[soft]]
+    out[touching] = here.force[touching]  # that of the bonds
+    return out
 
 
 __all__ = ["MovingContact", "closed_components", "known_forces"]

@@ -332,7 +332,10 @@ class InterfaceSolver(ABC):
             system.soften(bonds)
             if self.pairs[p].interface.contact:
                 normals = self.index[p][every[self.pairs[p].can_touch[every]], 0]
-                system.touches[normals[normals >= 0]] = True
+                normals = normals[normals >= 0]
+                system.touches[normals] = True
+                if system.soft_contact:
+                    system.contact[normals] = True
         self.state = Equilibrium(state.loads, force, state.jump, state.conjugate)
 
     def open(self, p: int, nodes: Ints) -> None:

@@ -281,7 +281,7 @@ class InterfaceSnes:
         equilibrium = system.equilibrium if self.motion is None else self.motion.equilibrium
         state = equilibrium(self.loads, self.force)
         for _ in range(4 * len(system.soft.bonds) + 4 if system.soft.bonds else 0):
-            if not system.soft.stable():
+            if not system.soft.stable(system.soft_held):
                 state = system.pass_unstable(state)
                 continue
             at, leaving = system.soft.first_event(self.accepted.jump, state.jump)

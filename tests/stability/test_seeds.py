@@ -24,6 +24,7 @@ FOUND = {
     44: "bodies that yield, contact that opens: balance off by 2 %",
     72: "friction in 3-D: work of contact that changed within an increment, 8e-8 of the energy",
     174: "above a node of the other face round-off chose whether faces were paired anew",
+    194: "bonds softened in mixed mode in motion: faces overlapped by 3e-3 of the largest jump",
     253: "path stepping with friction turned back and forth for ever",
     264: "likewise, on a path: f of another tip than the growing one differed by 6e-4",
     339: "likewise, in motion: other units changed the energies by 1e-3",
