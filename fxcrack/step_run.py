@@ -11,6 +11,7 @@ import numpy as np
 from fxcrack.base import log
 from fxcrack.base.checks import is_function, list_of
 from fxcrack.base.errors import InputError, SolverError
+from fxcrack.base.machine import threads_share_cores
 from fxcrack.base.together import check_same_call
 from fxcrack.continuum.inertia import Inertia
 from fxcrack.continuum.linear_range import warn_of_large_strain, warn_of_range
@@ -114,6 +115,14 @@ def checked_observers(observers: object) -> Sequence[Observer]:
     return found
 
 
+def _warn_of_threads(analysis: Analysis) -> None:
+    """Say once where threads and ranks compete for the cores."""
+    why = threads_share_cores(analysis.comm)
+    if why and "threads" not in analysis.said:
+        analysis.said.add("threads")
+        log.warn("%s, which slows all of them; set OMP_NUM_THREADS=1 before mpirun", why)
+
+
 def run_step(
     analysis: Analysis,
     step: Static | Cycles | Explicit,
@@ -142,6 +151,7 @@ def run_step(
     Returns:
         Number of rows that were there before, those of a step that is resumed included.
     """
+    _warn_of_threads(analysis)
     may_grow = [d in chosen for d in analysis.debonds]
     may_grow += [False] * (len(analysis.pairs) - len(analysis.debonds))
     analysis.activate(chosen, step)

@@ -172,46 +172,54 @@ def pytest_pycollect_makeitem(
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """With FXCRACK_TEST_SPREAD, leave some tests to the run on another number of ranks.
 
-    "quick": every other test runs on 2 ranks and the rest on 3. "slow": these tests run on the
-    number of ranks they did not have. Of the others, those without parameters all run on 2 ranks
-    and every other one of a file on 3, which share the two cores of a small machine; those with
-    parameters run on both, two thirds of the parameters on 2 ranks and one on 3. What bears the
-    mark "each" is not spread.
+    "quick" has the tests marked "three" that are not slow: of those without parameters every other
+    one runs on 2 ranks and the rest on 3, and so do the parameters of a test. "slow" has what is
+    left: tests of the quick run without parameters, on the number of ranks they did not have, and
+    the slow ones. Of these, 3 ranks have every third test of a file that has no parameters, and
+    every third parameter (of two the first): they share the two cores of a small machine and take
+    three times as long as 2 ranks, which have all tests without parameters and the other
+    parameters. What bears the mark "each" is not spread.
     """
     spread = os.environ.get("FXCRACK_TEST_SPREAD")
     if spread is None or WORLD.size not in (2, 3):
         return
-    left = []
-    functions: dict[str, dict[str, list[pytest.Item]]] = {}
+    here: set[pytest.Item] = set()
+    files: dict[str, dict[str, list[pytest.Item]]] = {}
     for item in items:
-        each = item.get_closest_marker("each") is not None
-        if _is_quick_on_ranks(item):
-            here = each or _ranks_when_quick(item) == WORLD.size
-            if here != (spread == "quick"):
-                left.append(item)
-        elif not each:
-            file, _, name = item.nodeid.partition("::")
-            functions.setdefault(file, {}).setdefault(name.partition("[")[0], []).append(item)
-    for of_file in functions.values():
+        file, _, name = item.nodeid.partition("::")
+        functions = files.setdefault(file, {})
+        if item.get_closest_marker("each"):
+            here.add(item)
+        else:
+            functions.setdefault(name.partition("[")[0], []).append(item)
+    for functions in files.values():
         singles = 0
-        for same in of_file.values():
-            if len(same) == 1:
-                singles += 1
-                left += same if WORLD.size == 3 and singles % 2 == 0 else []
+        for same in functions.values():
+            quick = [item for item in same if _is_quick_on_ranks(item)]
+            if spread == "quick":
+                here |= {item for i, item in enumerate(quick) if _is_here_when_quick(item, i)}
                 continue
-            every = 3 if len(same) > 2 else 2
-            left += [item for i, item in enumerate(same) if (i % every == 0) != (WORLD.size == 3)]
-    config.hook.pytest_deselected(items=left)
-    items[:] = [item for item in items if item not in left]
+            if len(quick) == 1 and not _is_here_when_quick(quick[0], 0):
+                here |= set(quick)
+            slow = [item for item in same if not _is_quick_on_ranks(item)]
+            if len(slow) == 1:
+                here |= set(slow) if WORLD.size == 2 or singles % 3 == 0 else set()
+                singles += 1
+            else:
+                every = 2 if len(slow) == 2 else 3
+                here |= {x for i, x in enumerate(slow) if (i % every == 0) == (WORLD.size == 3)}
+    config.hook.pytest_deselected(items=[item for item in items if item not in here])
+    items[:] = [item for item in items if item in here]
 
 
 def _is_quick_on_ranks(item: pytest.Item) -> bool:
     return bool(item.get_closest_marker("three")) and not item.get_closest_marker("slow")
 
 
-def _ranks_when_quick(item: pytest.Item) -> int:
-    """2 or 3, the same whatever else is collected."""
-    return 2 + zlib.crc32(item.nodeid.encode()) % 2
+def _is_here_when_quick(item: pytest.Item, i: int) -> bool:
+    """For the i-th parameter of a test; the same whatever else is collected."""
+    name = item.nodeid.partition("[")[0]
+    return 2 + (zlib.crc32(name.encode()) + i) % 2 == WORLD.size
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:

@@ -6,6 +6,7 @@ import io
 import logging
 import re
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -13,7 +14,9 @@ from mpi4py import MPI
 from specimens import dcb
 
 import fxcrack as fx
-from fxcrack.base import log
+from fxcrack import step_run
+from fxcrack.base import log, machine
+from fxcrack.base.machine import threads_share_cores
 from fxcrack.history import Row
 from fxcrack.steps import progress
 from fxcrack.steps.progress import Progress, clock, describe
@@ -180,3 +183,23 @@ def test_debug_says_what_the_solvers_did(caplog: pytest.LogCaptureFixture, finit
         assert sums("factorisations") > 0
     assert text[-1] == "fxcrack.step_run INFO step 1 ended: 1 nodes released"
     scene.close()
+
+
+def test_ranks_whose_threads_compete_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ranks that may each start several threads slow each other: once a scene, with the remedy."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(machine, "cores", lambda: 4)
+    alone, several = SimpleNamespace(size=1), SimpleNamespace(size=2)
+    assert threads_share_cores(alone) == ""  # type: ignore[arg-type]
+    words = "each of 2 ranks may start 4 threads"
+    assert threads_share_cores(several).startswith(words)  # type: ignore[arg-type]
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    assert threads_share_cores(several) == ""  # type: ignore[arg-type]
+    monkeypatch.delenv("OMP_NUM_THREADS")
+    before = log.n_warned()
+    scene = dcb(MPI.COMM_SELF, dx=2.0, ny=1)
+    monkeypatch.setattr(step_run, "threads_share_cores", lambda comm: words)
+    for k in (1, 2):
+        scene.run(fx.Static(until=fx.Releases(k)), progress=False)
+    assert sum(words in text for text in log.warned_since(before)) == 1

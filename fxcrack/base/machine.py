@@ -55,6 +55,18 @@ def cores() -> int:
     return os.cpu_count() or 1
 
 
+def threads_share_cores(comm: MPI.Comm) -> str:
+    """Why ranks wait for each other's threads of linear algebra, in words; "" if they do not.
+
+    OpenBLAS and MKL start as many threads as a process may use cores, unless the environment
+    limits them; those of one rank then take the cores of the others. Not collective.
+    """
+    limited = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    if comm.size == 1 or cores() == 1 or any(os.environ.get(name) for name in limited):
+        return ""
+    return f"each of {comm.size} ranks may start {cores()} threads of linear algebra"
+
+
 def peak_memory(comm: MPI.Intracomm) -> float:
     """Highest resident size of every rank's process so far, summed over ranks, MB; collective."""
     return float(comm.allreduce(_peak()))

@@ -25,6 +25,11 @@ except ImportError:  # it may move: the public product, which costs more for sma
         y += sp.csr_matrix((data, columns, starts), shape=(n, m)) @ x
 
 
+_ON_ONE_THREAD = 8192
+"""Entries of a vector that OpenBLAS does not share among threads: to wake one takes longer than the
+sum itself, and threads that wait for the next one take the cores of other processes."""
+
+
 class Product:
     """y += A x with a matrix in compressed rows.
 
@@ -119,8 +124,9 @@ class Product:
 
 def add_multiple(y: Array, factor: float, x: Array) -> None:
     """Add factor x to y in place, in one pass through memory; both contiguous, shape (n,)."""
-    if len(y):
-        daxpy(x, y, a=factor)
+    for begin in range(0, len(y), _ON_ONE_THREAD):
+        part = slice(begin, begin + _ON_ONE_THREAD)
+        daxpy(x[part], y[part], a=factor)
 
 
 def by_component(matrix: Any, n: int) -> sp.csr_matrix:

@@ -62,6 +62,13 @@ def read(path: Path) -> Result:
     return Result(columns, [dict(zip(columns, row, strict=True)) for row in rows], ends)
 
 
+def beginning(result: Result, rows: int) -> Result:
+    """The first rows, with the columns that hold something there; nothing of the last state."""
+    first = result.rows[:rows]
+    columns = [c for c in result.columns if any(_cell(row.get(c)) != "" for row in first)]
+    return Result(columns, first, {"reason": ""})
+
+
 def kind_of(column: str) -> str:
     """The part of a column's name before its bracket."""
     return column.split("[")[0]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -703,15 +704,27 @@ class _StopAt:
             raise _Stopped
 
 
-def run(name: str, comm: MPI.Intracomm) -> Result:
-    """Run a scene by its name; collective."""
+def run(name: str, comm: MPI.Intracomm, rows: int | None = None) -> Result:
+    """Run a scene by its name; collective.
+
+    Args:
+        name: Key of :data:`SCENES`.
+        comm: Communicator.
+        rows: Rows after which the run is given up; the result holds no more than these.
+    """
     golden = SCENES[name]
     scene = golden.make(comm)
-    if golden.stop is None:
-        for step in golden.steps:
-            scene.run(step, progress=False)
-    else:
-        scene = _interrupted(golden, scene, comm)
+    given_up = [] if rows is None else [_StopAt(rows)]
+    with suppress(_Stopped):
+        if golden.stop is None:
+            for step in golden.steps:
+                scene.run(step, progress=False, observers=given_up)
+        else:
+            scene = _interrupted(golden, scene, comm, rows)
+    if rows is not None:
+        result = Result(scene.history.columns, scene.history.rows, {})
+        scene.close()
+        return result
     ends: dict[str, float | str] = {"reason": scene.history.reason}
     u = fx.displacement_function(scene)
     mine = u.x.array[: u.function_space.dofmap.index_map.size_local * u.function_space.dofmap.bs]
@@ -723,7 +736,9 @@ def run(name: str, comm: MPI.Intracomm) -> Result:
     return Result(scene.history.columns, scene.history.rows, ends)
 
 
-def _interrupted(golden: Golden, scene: fx.Scene, comm: MPI.Intracomm) -> fx.Scene:
+def _interrupted(
+    golden: Golden, scene: fx.Scene, comm: MPI.Intracomm, rows: int | None
+) -> fx.Scene:
     """Run the only step, stop it at a row, continue it in a new scene."""
     (step,) = golden.steps
     assert golden.stop is not None
@@ -738,7 +753,9 @@ def _interrupted(golden: Golden, scene: fx.Scene, comm: MPI.Intracomm) -> fx.Sce
     assert stopped, f"the step ended before row {golden.stop}"
     scene.close()
     again = golden.make(comm)
-    again.run(step, progress=False, checkpoint=kept, restart=True)
+    given_up = [] if rows is None else [_StopAt(rows - golden.stop)]
+    with suppress(_Stopped):
+        again.run(step, progress=False, checkpoint=kept, restart=True, observers=given_up)
     comm.Barrier()
     if made is not None:
         made.cleanup()

@@ -12,7 +12,7 @@ from dataclasses import replace
 import pytest
 from mpi4py import MPI
 
-from golden.histories import FOLDER, deviation, read, text_of
+from golden.histories import FOLDER, beginning, deviation, read, text_of
 from golden.scenes import SCENES, Result, run
 
 TOLERANCE = 1e-9
@@ -39,7 +39,18 @@ def marked(name: str) -> object:
 @pytest.mark.each
 @pytest.mark.parametrize("name", [marked(n) for n in SCENES])
 def test_history_is_what_it_was(comm: MPI.Intracomm, name: str) -> None:
-    off, where = deviation(read(FOLDER / f"{name}.csv"), run(name, comm))
+    """Of long scenes the beginning only on several ranks, through two releases."""
+    stored = read(FOLDER / f"{name}.csv")
+    golden, rows = SCENES[name], None
+    if golden.long and comm.size > 1:
+        releases = [i for i, row in enumerate(stored.rows) if row["event"] == "release"]
+        # a restart is to be followed by some rows
+        rows = max(releases[:2][-1] + 1, 0 if golden.stop is None else golden.stop + 3)
+    found = run(name, comm, rows)
+    if rows is not None:
+        stored, found = beginning(stored, rows), beginning(found, rows)
+        assert len(found.rows) == rows
+    off, where = deviation(stored, found)
     assert off <= TOLERANCE, f"deviates by {off:.1e} in {where}"
 
 
