@@ -178,6 +178,10 @@ def run(
 ) -> None:
     """Run a keyword deck, and write its history, fields, bonds and crack tips."""
     _listen(level, quiet)
+    if deck.suffix == ".py":
+        raise InputError(
+            f"'{deck}' is a Python script, not a keyword deck; run it by python {deck}"
+        )
     from fxcrack.deck.run import check_only, run_deck
 
     if check:

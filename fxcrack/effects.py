@@ -58,6 +58,10 @@ def temperature_of(effects: Sequence[Any]) -> Temperature | None:
     """
     names = [type(e).__name__ for e in effects]
     for effect, name in zip(effects, names, strict=True):
+        if isinstance(effect, type) and issubclass(effect, _KNOWN):
+            raise InputError(
+                f"effects: {effect.__name__} is a class; make one, {effect.__name__}(...)"
+            )
         if not isinstance(effect, _KNOWN):
             raise InputError(
                 f"effects: {name} is not an effect; known: {', '.join(k.__name__ for k in _KNOWN)} "

@@ -132,7 +132,9 @@ class History:
     def __getitem__(self, column: slice) -> list[Row]: ...
 
     def __getitem__(self, column: str | int | slice) -> npt.NDArray[Any] | Row | list[Row]:
-        """A column, shape (n_rows,), NaN where a row lacks it; by a number or a slice, rows.
+        """A column, shape (n_rows,), NaN where a row lacks it; by a whole number, that row.
+
+        By a slice such as ``history[-3:]`` it is a list of rows.
 
         Raises:
             InputError: No row has the column, or it is neither a name nor a number nor a slice.
@@ -142,7 +144,7 @@ class History:
             return self.rows[column]
         if isinstance(column, int | np.integer):
             return self.rows[int(column)]
-        text("history", "column", column)
+        text("history[...]", "a column", column)
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])
@@ -278,7 +280,7 @@ class History:
             if np.isnan(values).all():
                 continue
             row = self.rows[int(np.nanargmax(values))]
-            at = row.get(f"{x}[{load}]", np.nan)
+            at = float(row.get(f"{x}[{load}]", np.nan)) + 0.0  # no -0
             lines.append(f"largest {y}[{load}]: {row[f'{y}[{load}]']:.6g} at {x} = {at:.6g}")
         for title in (c[2:-1] for c in names if c.startswith("a[")):
             a, released = self[f"a[{title}]"].astype(float), self[f"released[{title}]"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -140,6 +140,40 @@ class Scene:
         )
         self._files = RunFiles()
 
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refuse a change of what the scene was made of, which nothing would take up.
+
+        Raises:
+            InputError: It is not part of the state.
+        """
+        if not name.startswith("_") and name not in ("input", "analysis", "history"):
+            known = name in {f.name for f in fields(SceneInput)}
+            raise InputError(
+                f"a scene is not changed by scene.{name} = ...; make another one of the same "
+                + (f"parts, scene.rebuilt({name}=...)" if known else "parts by scene.rebuilt(...)")
+            )
+        super().__setattr__(name, value)
+
+    def __repr__(self) -> str:
+        """Mesh, model, interfaces and present time."""
+        names = ", ".join(f"'{i.title}'" for i in self.input.interfaces) or "none"
+        return (
+            f"<Scene of mesh '{self.mesh.name}', {type(self.input.model).__name__}, interfaces: "
+            f"{names}, time {self.time:g}>"
+        )
+
+    def __reduce_ex__(self, protocol: Any) -> NoReturn:
+        """Refuse copying and pickling, which also subprocesses do with what they are given.
+
+        Raises:
+            InputError: Always.
+        """
+        raise InputError(
+            "a scene holds a distributed mesh and factorisations and cannot be copied or pickled; "
+            "make another one of the same parts, scene.rebuilt(), keep its state by "
+            "checkpoint=Checkpoint(path), or pass on scene.history"
+        )
+
     def rebuilt(self, **changes: Any) -> Scene:
         """A new scene of the same input; collective.
 
@@ -157,7 +191,7 @@ class Scene:
     @property
     def debonds(self) -> Sequence[Debond]:
         """Interfaces that may come apart."""
-        return self.analysis.debonds
+        return tuple(self.analysis.debonds)
 
     @property
     def continuum(self) -> Continuum:

@@ -55,6 +55,10 @@ def test_help_and_version_answer_at_once(word: str, says: str) -> None:
 
 
 def test_the_overview_names_every_command() -> None:
+    unknown = python(START + LOADED + "fxcrack_command.main()", "benhc")
+    assert unknown.returncode == 2
+    assert "no command 'benhc' (did you mean 'bench'?)" in unknown.stderr
+    assert "'dolfinx'" not in unknown.stderr
     text = fxcrack_command.overview()
     for command in cli.app.registered_commands:
         assert command.callback is not None

@@ -117,17 +117,25 @@ def test_modes_do_not_depend_on_the_mesh(order: int, pair: tuple[Any, Any]) -> N
     assert np.ptp(found) < 0.3
 
 
-def test_at_the_length_of_the_elements_modes_are_those_of_crack_closure() -> None:
+def test_at_the_length_of_the_elements_modes_are_those_of_crack_closure(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     # to the order of eps^2: the sum of the modes exactly
-    turned, plain = (strip(METAL, RESIN, dx=0.2, **o) for o in ({"mode_length": 0.2}, {"rings": 3}))
+    mixed: dict[str, Any] = {"GIIc": 2e5, "mix": fx.BK(2.0)}
+    turned = strip(METAL, RESIN, dx=0.2, mode_length=0.2, **mixed)
+    assert "belong to the length of the elements" not in caplog.text
+    plain = strip(METAL, RESIN, dx=0.2, **mixed)
+    # eps ln 2 of this pair is 2.2 degrees
+    assert "they turn by 2.2 degrees of phase each time elements become half" in caplog.text
     sums = [float(r["GI[bond]"]) + float(r["GII[bond]"]) for r in (turned, plain)]
     assert sums[0] == pytest.approx(sums[1], rel=1e-12)
     assert float(turned["GI[bond]"]) == pytest.approx(float(plain["GI[bond]"]), rel=0.01)
 
 
 def test_one_material_has_no_length() -> None:
+    mixed: dict[str, Any] = {"GIIc": 2e5, "mix": fx.BK(2.0)}
     turned, plain = (
-        strip(PLY, PLY, dx=0.2, **o) for o in ({"mode_length": 1e-3}, {"rings": 3})
+        strip(PLY, PLY, dx=0.2, **o) for o in ({"mode_length": 1e-3}, mixed)
     )  # fmt: skip
     for mode in ("GI[bond]", "GII[bond]"):
         assert float(turned[mode]) == pytest.approx(float(plain[mode]), rel=1e-12)

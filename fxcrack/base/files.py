@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 import os
 import secrets
+import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -20,10 +22,38 @@ def open_to_append(path: Path) -> BinaryIO:
     return os.fdopen(os.open(path, os.O_WRONLY | os.O_APPEND | _NO_LINK), "ab", buffering=0)
 
 
+def _is_stream(path: Path) -> bool:
+    """Whether a path names a device, a pipe or a descriptor of this process."""
+    try:
+        return path.is_char_device() or path.is_fifo() or path.is_socket() or _is_descriptor(path)
+    except OSError:
+        return False
+
+
+def _is_descriptor(path: Path) -> bool:
+    """Whether it is /dev/stdout, /dev/stderr or one of /dev/fd, whatever these lead to."""
+    return path.exists() and path.absolute().parent in (Path("/dev"), Path("/dev/fd"))
+
+
+def _stream(path: Path) -> int:
+    """Open a stream for writing, behind what was written to it before."""
+    return os.open(path, os.O_WRONLY | os.O_APPEND)
+
+
 @contextmanager
 def replacing(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary path in the same folder; it replaces ``path`` if nothing fails."""
+    """Yield a temporary path in the same folder; it replaces ``path`` if nothing fails.
+
+    A device, a pipe or what /dev/stdout stands for is never replaced: the file is copied into it.
+    """
     path = Path(path)
+    if _is_stream(path):
+        with tempfile.TemporaryDirectory() as folder:
+            whole = Path(folder) / path.name
+            yield whole
+            with whole.open("rb") as source, os.fdopen(_stream(path), "wb", buffering=0) as sink:
+                shutil.copyfileobj(source, sink)
+        return
     path.parent.mkdir(parents=True, exist_ok=True)
     # a name nobody can guess, which must not be there yet, with the permissions that the umask of
     # the user leaves

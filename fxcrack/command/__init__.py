@@ -8,6 +8,7 @@ package loads DOLFINx, which takes seconds. What the commands are is read from t
 from __future__ import annotations
 
 import ast
+import difflib
 import importlib.metadata
 import importlib.util
 import os
@@ -34,6 +35,13 @@ def main() -> None:
     if not words or words[0] in _HELP:
         _print(overview())
         sys.exit(0 if words else 2)
+    known = [name for name, _ in _commands()]
+    if not words[0].startswith("-") and words[0] not in known:
+        close = difflib.get_close_matches(words[0], known, n=1)
+        meant = f" (did you mean '{close[0]}'?)" if close else ""
+        commands = ", ".join(known)
+        _print(f"fxcrack: there is no command '{words[0]}'{meant}; known: {commands}", error=True)
+        sys.exit(2)
     try:
         from fxcrack import cli
     except ImportError as error:

@@ -275,17 +275,33 @@ class TipEvaluator(Evaluator):
             measured: From :meth:`measure`, shape (n, 6 k).
 
         Raises:
-            InputError: f has another shape than (n,), or is NaN.
+            InputError: The function fails, f has another shape than (n,) or is NaN, or what it
+                reports is no array of numbers of that shape.
         """
         n = len(tips)
+        where = f"interface '{self.probe.pair.title}'"
         force, opening = np.split(measured, 2, axis=1)
-        found = self._function(tips, force.reshape(n, -1, 3), opening.reshape(n, -1, 3))
-        f, report = found if isinstance(found, tuple) else (found, {})
-        f = np.asarray(f, dtype=np.float64)
+        try:
+            found = self._function(tips, force.reshape(n, -1, 3), opening.reshape(n, -1, 3))
+            f, report = found if isinstance(found, tuple) else (found, {})
+            f = np.asarray(f, dtype=np.float64)
+            report = {name: np.asarray(v, dtype=np.float64) for name, v in dict(report).items()}
+        except Exception as error:
+            raise InputError(
+                f"{where}: the function of the criterion fails with {type(error).__name__}: "
+                f"{error}; it is called with the tips and arrays of shape ({n}, k, 3) of forces "
+                "and openings, and returns f, or f and a dictionary of arrays"
+            ) from error
         if f.shape != (n,) or np.isnan(f).any():
             what = f"has shape {f.shape}" if f.shape != (n,) else "is NaN"
             raise InputError(
-                f"interface '{self.probe.pair.title}': f of the criterion {what}; its function "
+                f"{where}: f of the criterion {what}; its function "
                 f"must return one number per tip, shape ({n},), or such an array and a dictionary"
             )
-        return f, {name: np.asarray(values, dtype=np.float64) for name, values in report.items()}
+        for name, values in report.items():
+            if values.shape != (n,):
+                raise InputError(
+                    f"{where}: the criterion reports '{name}' of shape {values.shape}; it must be "
+                    f"an array of one number per tip, shape ({n},)"
+                )
+        return f, report

@@ -40,9 +40,13 @@ from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.criteria.cell_laws import law_of
 from fxcrack.criteria.closure_lengths import length_of_force
 from fxcrack.criteria.crack_tip_fields import TipFields
+from fxcrack.criteria.evaluator import at_rows
 from fxcrack.criteria.probe import FrontProbe
 from fxcrack.interface.front import Front
 from fxcrack.interface.tips import Tips
+
+_TURN = 1.0
+"""Degrees by which the modes may turn with elements half as long before it is told."""
 
 
 def closure_angle(oscillation: float) -> float:
@@ -135,6 +139,16 @@ class ModesAtLength:
         out[rows[good]] = (whole[:, None] * parts + third[:, None] * alone)[good]
         return out
 
+    def oscillation(self, tips: Tips) -> Array:
+        """Oscillation index of each tip, shape (n,); collective.
+
+        Where cells of several materials meet on one side, that of the first of them.
+        """
+        self._said, said = True, self._said
+        eps = self._of(tips)[1]
+        self._said = said
+        return eps
+
     def _of(self, tips: Tips) -> tuple[Array, Array]:
         """What takes tractions to the oscillating pair and the third, and eps, of each tip."""
         front = self._probe.front
@@ -187,3 +201,36 @@ def lengths_of_closure(tips: Tips, order: int, method: str) -> Array:
         return np.where(on, tips.d_ahead, tips.d_behind)
     ahead = np.where(on & tips.straight, tips.d_ahead, tips.d_behind)
     return length_of_force(ahead, tips.d_behind, min(order, 2))
+
+
+def warn_of_turning_modes(probe: FrontProbe) -> None:
+    """Warn where a mode mix decides between two materials and belongs to the element length.
+
+    Nothing is said where :class:`ModesAtLength` does not know the fields (shells, moduli tabulated
+    against temperature, explicit dynamics). First, middle and last tip are looked at; collective.
+
+    Args:
+        probe: The interface, with its front in the initial state.
+    """
+    tips = probe.front.tips()
+    if probe.pair.rigid is not None or not len(tips):
+        return
+    try:
+        if len(probe.bodies.continuum.part_materials) < 2:
+            return
+        modes = ModesAtLength(probe, 1.0)
+    except InputError:
+        return
+    some = np.unique([0, len(tips) // 2, len(tips) - 1])
+    eps = modes.oscillation(at_rows(tips, some))
+    turn = float(np.degrees(np.log(2.0) * np.abs(eps).max()))
+    if turn > _TURN:
+        log.warn(
+            "interface '%s' lies between two materials, where the modes of crack closure belong to "
+            "the length of the elements: they turn by %.2g degrees of phase each time elements "
+            "become half as long (oscillation index %.2g), and toughness at the mode mix changes "
+            "with them; state the length for which the toughness was found, mode_length=...",
+            probe.pair.title,
+            turn,
+            float(np.abs(eps).max()),
+        )

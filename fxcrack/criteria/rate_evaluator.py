@@ -19,7 +19,7 @@ from fxcrack.criteria.evaluator import SofteningEvaluator, TipValues, first_tips
 from fxcrack.criteria.interface_temperature import InterfaceTemperature
 from fxcrack.criteria.ligaments import Ligaments
 from fxcrack.criteria.mixed_mode import total
-from fxcrack.criteria.mode_length import ModesAtLength, lengths_of_closure
+from fxcrack.criteria.mode_length import ModesAtLength, lengths_of_closure, warn_of_turning_modes
 from fxcrack.criteria.probe import (
     FrontProbe,
     State,
@@ -73,6 +73,8 @@ class RateEvaluator(SofteningEvaluator):
         self._modes: ModesAtLength | None = None
         if criterion.mode_length is not None:
             self._modes = ModesAtLength(probe, criterion.mode_length)
+        elif criterion.mix is not None and criterion.method != "domain":
+            warn_of_turning_modes(probe)
         hierarchy = probe.pair.hierarchy
         self._largest_unit = 0 if hierarchy is None else 1 + hierarchy.most_beside()
         surface = probe.pair.surface

@@ -201,6 +201,7 @@ def check_slaves(
         supported = taking_part.copy()
         displacement = which[slave[taking_part], : nodes.layout.gdim]
         supported[taking_part] = (displacement >= 0).any(axis=1)
+        without: dict[str, list[int]] = {}
         for node in np.flatnonzero(supported):
             masters = nodes.find(pair.masters_under(int(node)))
             own = which[slave[node], : nodes.layout.gdim], value[slave[node]]
@@ -226,12 +227,16 @@ def check_slaves(
                 )
             taking_part[node] = False
             if pair.interface.contact:
-                log.warn(
-                    "interface '%s': no contact at the node at %s, which support '%s' holds",
-                    pair.title,
-                    format_point(pair.surface.x[node]),
-                    column.title,
-                )
+                without.setdefault(column.title, []).append(int(node))
+        for title, held in without.items():
+            more = f" and {len(held) - 1} more" if len(held) > 1 else ""
+            log.warn(
+                "interface '%s': no contact at the node at %s%s, which support '%s' holds",
+                pair.title,
+                format_point(pair.surface.x[held[0]]),
+                more,
+                title,
+            )
 
 
 def _check_points_held(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any, NoReturn
 
 from fxcrack.base import compat  # isort: skip  (orders MPI before DOLFINx)
 import dolfinx.mesh
@@ -54,6 +55,17 @@ class Mesh:
         return (
             f"Mesh '{self.name}', {self.gdim}-D, order {self.order}, groups: "
             f"{self._listing() or 'none'}"
+        )
+
+    def __reduce_ex__(self, protocol: Any) -> NoReturn:
+        """Refuse copying and pickling: the parts of a DOLFINx mesh can be neither.
+
+        Raises:
+            MeshError: Always.
+        """
+        raise MeshError(
+            f"mesh '{self.name}' is distributed by DOLFINx and cannot be copied or pickled; "
+            "several scenes may share one mesh, and another process reads it anew"
         )
 
     def _listing(self) -> str:

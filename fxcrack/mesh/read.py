@@ -55,9 +55,14 @@ def read_mesh(
 
     def work() -> RawMesh:
         if path.suffix.lower() not in _READABLE:
+            if path.suffix.lower() == ".inp":
+                raise MeshError(
+                    f"'{path}' is a keyword deck; read it with read_deck('{path}'), which gives a "
+                    "scene"
+                )
             raise MeshError(
-                f"'{path}' is not a .msh file; write one with gmsh.write('{path.stem}.msh'), or "
-                "give a .unv, .med or .cgns file"
+                f"'{path}' is not a .msh file; write one with gmsh.write('{path.stem}.msh'), give "
+                "a .unv, .med or .cgns file, or read it by DOLFINx and take from_dolfinx(...)"
             )
         if not path.is_file():
             raise MeshError(f"there is no mesh file '{path}' (looked in {Path.cwd()})")

@@ -22,6 +22,7 @@ import numpy as np
 import petsc4py
 from matplotlib.figure import Figure
 
+from fxcrack.base.errors import InputError
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
 from fxcrack.history import History
@@ -93,6 +94,8 @@ def write_report(
     """
     analysis = analysis_of(source)
     analysis.check_started("its report")
+    if Path(path).suffix.lower() not in (".html", ".htm"):
+        raise InputError(f"a report is an .html file, not '{path}'; a browser prints it to PDF")
     history, explanation = analysis.history, explain(analysis)
     figures = _figures(analysis, history)
     with all_or_none(analysis.comm, f"writing {path}"):

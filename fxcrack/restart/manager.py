@@ -137,6 +137,12 @@ class RestartManager:
             return
         found = differences(saved.about["scene"], self._print)
         if found:
+            if all(name.startswith("step.") for name in found):
+                raise InputError(
+                    f"checkpoint {path} belongs to another step of this scene: {summary(found)}. "
+                    "To go further than it went, run the step as it was with restart=True, which "
+                    "goes on from the checkpoint, and then this one; or run without restart"
+                )
             raise InputError(
                 f"checkpoint {path} belongs to another scene: {summary(found)}. Run without "
                 "restart, or correct the scene"

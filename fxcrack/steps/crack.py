@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import cast
 
 import numpy as np
 
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.base.checks import format_point
+from fxcrack.base.checks import format_point, missing_members, shown
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion, ReleaseLaw
 from fxcrack.criteria.evaluator import (
@@ -302,4 +303,19 @@ def make_evaluator(
     temperature = given_temperature(probe.pair, probe.gdim, debond.temperature)
     if temperature is None and criterion.needs_temperature:
         temperature = scene_temperature(probe.pair, solver.continuum)
-    return criterion.evaluator(probe, temperature, softens=softens)
+    try:
+        inspect.signature(criterion.evaluator).bind(probe, temperature, softens=softens)
+    except TypeError as error:
+        raise InputError(
+            f"interface '{probe.pair.title}': {type(criterion).__name__}.evaluator must take "
+            f"(probe, temperature, *, softens=False): {error}"
+        ) from error
+    found = criterion.evaluator(probe, temperature, softens=softens)
+    missing = missing_members(found, Evaluator)
+    if missing:
+        raise InputError(
+            f"interface '{probe.pair.title}': {type(criterion).__name__}.evaluator returned "
+            f"{shown(found)} ({missing}); it must return an Evaluator, such as "
+            "TipEvaluator(probe, function)"
+        )
+    return found

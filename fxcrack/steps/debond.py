@@ -132,8 +132,9 @@ def check_criterion(where: str, criterion: Criterion) -> None:
     """
     missing = missing_members(criterion, Criterion)
     if missing:
+        kind = criterion if isinstance(criterion, type) else type(criterion)
         raise InputError(
-            f"{where}: {type(criterion).__name__} is not a criterion ({missing}); give VCCT or "
+            f"{where}: {kind.__name__} is not a criterion ({missing}); give VCCT or "
             "another of them, or derive yours from Criterion"
         )
     owner = f"{where}: {type(criterion).__name__}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time as clock
 from typing import Any
 
@@ -31,6 +32,8 @@ CHECK = 100
 """Increments between looks at signals and checkpoints."""
 _NONE = 1e-9
 """Part of a row that is none."""
+_FEW = 3.0
+"""Increments in a step from which on the bodies can have moved."""
 _SHORT = 3.0
 """Shortening of the increments by bulk viscosity that is told."""
 _NONLINEAR = 1e3
@@ -100,6 +103,14 @@ class ExplicitDriver:
         if self._resume is not None and "increments" in self._resume:
             increments.restore(self._resume["increments"])
         solver.dt = increments.dt
+        if length < _FEW * solver.dt:
+            log.warn(
+                "Explicit: increments are %g long and the step is over after %d of them, too few "
+                "for anything to move; are end time and density of the same units as moduli and "
+                "lengths? With mm, N and s a density is in tonnes per mm^3 (2.7e-9 for aluminium)",
+                solver.dt,
+                math.ceil(length / solver.dt),
+            )
         now = analysis.loads_at(increments.time(self._n))
         resumed = self._resume is not None
         while True:
