@@ -243,7 +243,7 @@ def test_soft_structure_is_no_mechanism(comm: MPI.Intracomm) -> None:
     mesh = dcb_2d(comm, length=400.0, height=1.0, dx=4.0, ny=2)
     soft = specimen(mesh, a0=200.0, materials={"upper": fx.Isotropic(70.0, 0.3),
                                                "lower": fx.Isotropic(70e3, 0.3)})  # fmt: skip
-    assert soft.run(fx.Static(until=fx.Releases(1))).reason == "1 nodes released"
+    assert soft.run(fx.Static(until=fx.Releases(1))).reason == "1 node released"
     soft.close()
 
 

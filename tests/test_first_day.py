@@ -82,7 +82,7 @@ def test_a_crack_longer_than_its_interface(
 ) -> None:
     scene = specimen(mesh(comm))
     ends = [fx.CrackLength(interface_of(scene), 60.1), fx.Releases(1)]
-    assert scene.run(fx.Static(until=ends)).reason == "1 nodes released"
+    assert scene.run(fx.Static(until=ends)).reason == "1 node released"
     if comm.rank == 0:
         assert "CrackLength(60.1): the crack of 'bond' cannot be longer than 60" in caplog.text
 

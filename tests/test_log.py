@@ -181,7 +181,7 @@ def test_debug_says_what_the_solvers_did(caplog: pytest.LogCaptureFixture, finit
         assert 0 < sums("iterations") <= counts.iterations
         assert sum(len(t.split("residuals ")[1].split(", ")) for t in trials) >= len(trials)
         assert sums("factorisations") > 0
-    assert text[-1] == "fxcrack.step_run INFO step 1 ended: 1 nodes released"
+    assert text[-1] == "fxcrack.step_run INFO step 1 ended: 1 node released"
     scene.close()
 
 

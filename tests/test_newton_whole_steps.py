@@ -61,7 +61,7 @@ def test_no_equilibrium_between_here_and_beyond(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(type(scene.solver), "move", stubborn)
     history = scene.run(fx.Static(until=fx.Releases(1), maximum=50.0))
-    assert history.reason == "1 nodes released"
+    assert history.reason == "1 node released"
     assert onsets(history)[0]["f[bond]"] == pytest.approx(1.0, abs=1e-8)
 
 
