@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dolfinx
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import fxcrack as fx
 from fxcrack.continuum.temperature import ByTemperature
 from fxcrack.deck.cards import DeckError
+from fxcrack.deck.cell_field import CellField
 from tests.decks import PLATE, STEP, read, write
 from tests.test_deck_mesh import PARTS
 
@@ -666,13 +669,50 @@ def test_free_thermal_expansion(tmp_path):
 
 def test_a_temperature_that_varies_from_node_to_node(tmp_path):
     text = PLATE.replace("200., 0.25", "200., 0.\n*EXPANSION\n1E-3")
-    text += "*NSET, NSET=CORNER\n3\n*BOUNDARY\n1, 1, 2\n3, 2\n"
+    text += "*NSET, NSET=CORNER\n3\n*NSET, NSET=TOP\n6\n*BOUNDARY\n1, 1, 2\n3, 2\n"
     text += "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nALL, 0.\n"
     cards = ("*TEMPERATURE", "LEFT, 10.", "2, 20.", "5, 20.", "RIGHT, 30.")
-    cards += ("*NODE PRINT, NSET=CORNER", "U1")
-    row = fx.read_deck(write(tmp_path, text + stepped(*cards)), order=2).run().rows[-1]
+    cards += ("*NODE PRINT, NSET=CORNER", "U1", "*NODE PRINT, NSET=TOP", "U")
+    path = write(tmp_path, text + stepped(*cards))
+    row = fx.read_deck(path, order=2).run().rows[-1]
     # without stress in the plane u = alpha (10 x + 5 x^2 - 5 y^2, 10 y + 10 x y)
     assert row["m[U1 CORNER]"] == pytest.approx(1e-3 * 40.0, rel=1e-10)
+    assert row["m[U1 TOP]"] == pytest.approx(1e-3 * 35.0, rel=1e-10)
+    assert row["m[U2 TOP]"] == pytest.approx(1e-3 * 30.0, rel=1e-10)
+    # first-order cells have the temperature of their middles, 15 and 25
+    row = fx.read_deck(path, order=1).run().rows[-1]
+    assert row["m[U1 CORNER]"] == pytest.approx(1e-3 * 40.0, rel=1e-10)
+
+
+@pytest.mark.parametrize(
+    ("cell", "order"), [(c, o) for c in ("quadrilateral", "hexahedron", "tetrahedron")
+                        for o in (1, 2)],
+)  # fmt: skip
+def test_values_at_nodes_are_interpolated_within_cells(cell, order):
+    """On slender cells that are sheared, where the nearest middle is often that of another cell."""
+    tdim = 2 if cell == "quadrilateral" else 3
+    kind = getattr(dolfinx.mesh.CellType, cell)
+    sizes, ends = (3, 9, 2)[:tdim], (np.zeros(tdim), np.ones(tdim))
+    create = dolfinx.mesh.create_rectangle if tdim == 2 else dolfinx.mesh.create_box
+    mesh = create(MPI.COMM_SELF, ends, sizes, kind)
+    space = dolfinx.fem.functionspace(mesh, ("Lagrange", order))
+    scale = np.diag([30.0, 1.0, 2.0])
+    scale[0, 1] = 4.0
+    positions = space.tabulate_dof_coordinates() @ scale.T
+
+    def given(x):
+        return 3.0 + x[0] - 5.0 * x[1] + (0.2 * x[0] * x[1] - x[1] ** 2 if order > 1 else 0.0)
+
+    found = CellField(
+        cell, order, positions[:, :tdim], np.asarray(space.dofmap.list), given(positions.T)
+    )
+    rng = np.random.default_rng(1)
+    at = np.zeros((3, 400))
+    at[:tdim] = rng.random((tdim, 400))
+    at = scale @ at
+    assert np.allclose(found(at), given(at), rtol=0.0, atol=1e-9)
+    outside = at + np.array([[100.0], [0.0], [0.0]])
+    assert np.isfinite(found(outside)).all()
 
 
 def test_a_dynamic_step_runs(tmp_path):

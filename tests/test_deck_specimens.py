@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import fxcrack as fx
-from tests.decks import write
+from tests.decks import read, write
 
 ARMS = """*heading
  arms of 60 x 2, nodes of the faces 1 to 31 and 1101 to 1131
@@ -363,3 +363,15 @@ def test_solid_arms_by_parts_in_two_steps(tmp_path):
     found = deck.run()
     assert found.rows[-1]["released[Upper.Face]"] > 0
     same(found, by_hand.history)
+
+
+def test_fronts_in_3d_under_fatigue_keep_their_elements(tmp_path):
+    """Nodes go one after the other in a deck; of second order they are more, and slower."""
+    assert read(tmp_path, PARTS).raw.order == 2
+    law = "*Fracture Criterion, type=FATIGUE\n0., -2., 1e-3, 3., 0.01, 0.85, 0.5, 0.5\n0.5, 1."
+    text = PARTS[: PARTS.index("*Fracture Criterion")] + law + "\n*End Step\n"
+    text = text.replace("*Static\n0.1, 1., 1e-05, 0.1", "*Direct cyclic, fatigue\n0.1, 1.")
+    found = read(tmp_path, text)
+    assert found.raw.order == 1
+    (said,) = (line for line in found.report.replaced if "lock" in line)
+    assert "mesh the thickness with more elements" in said and "many times as many cycles" in said

@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.temperature import Spatial, Temperature
 from fxcrack.deck.cards import Card, DeckError, Row
+from fxcrack.deck.cell_field import CellField
 from fxcrack.deck.flat import Flat
 from fxcrack.deck.report import Report
 from fxcrack.deck.tracks import Amplitudes, Curve, Period
@@ -152,7 +153,10 @@ class Temperatures:
             return float(values[0])
         x = flat.points[used][:, : flat.kind.gdim]
         check_unique(x, values, self._first, "temperatures")
-        return NodalField(x, values)
+        if flat.kind.shell:  # asked for above and below nodes
+            return NodalField(x, values)
+        kind, number = flat.kind, np.cumsum(used) - 1
+        return CellField(kind.cell, kind.order, x, number[flat.dolfinx_cells()], values)
 
 
 def check_unique(x: Array, values: Array, card: Card | None, what: str) -> None:
