@@ -269,6 +269,16 @@ def test_gap(comm: MPI.Intracomm, gap: str) -> None:
     )
 
 
+def test_gaps_of_round_off_are_none() -> None:
+    """Faces that touch hold a body, wherever it is and however it is turned."""
+    for pairing in ("node-to-surface", "surface-to-surface"):
+        mesh = small(MPI.COMM_SELF, nx_lower=5)
+        turn(mesh, 17.0)
+        continuum = Continuum(mesh, STEEL, fx.PlaneStrain())
+        pair = make_pair(continuum, bond(-1.0, gap="keep", pairing=pairing))
+        assert pair.paired.all() and not pair.gap.any()
+
+
 @pytest.mark.mpi
 def test_bonded_sets(comm: MPI.Intracomm) -> None:
     """A function, an array, a group of nodes and all say the same."""

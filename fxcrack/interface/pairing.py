@@ -40,6 +40,8 @@ from fxcrack.interface.roles import (
 )
 from fxcrack.interface.surface import FacetSurface, gather_surface
 
+_TOUCHES = 1e-9
+"""Part of the length of a facet up to which an initial gap is none."""
 _BORDER = 1e-6
 """Distance to the border of the bonded region, in facet lengths, up to which a node is on it."""
 
@@ -228,10 +230,8 @@ def make_pair(
         feet = master.dofs[nodes], weights
         means = surface_weights(slave, master, foot, tolerance)
         nodes, weights = means.masters, means.weights
-    gap = np.zeros(slave.n_nodes)
-    if interface.gap == "keep":
-        below = np.einsum("nk,nkc->nc", weights, master.x[nodes])
-        gap = np.einsum("ni,ni->n", slave.x - below, normals)
+    below = np.einsum("nk,nkc->nc", weights, master.x[nodes])
+    gap = _kept_gaps(interface, slave, np.einsum("ni,ni->n", slave.x - below, normals))
     pair = Pair(
         interface=interface,
         surface=slave,
@@ -270,6 +270,22 @@ def _with_partners(pair: Pair, grown: Bools, *, cracks: bool) -> Pair:
     return replace(pair, bonded=pair.hierarchy.bonded(bonded) | grown)
 
 
+def _kept_gaps(interface: Interface, slave: FacetSurface, gap: Array) -> Array:
+    """Initial gaps that contact starts from, shape (n_nodes,), length.
+
+    Those that are round-off of the coordinates are zero: faces that touch before any load acts
+    would open at some nodes and not at others, and hold no body.
+
+    Args:
+        interface: What the user gave.
+        slave: Its slave surface.
+        gap: Distances of the slave nodes from the master, shape (n_nodes,), length.
+    """
+    if interface.gap != "keep":
+        return np.zeros(slave.n_nodes)
+    return np.where(np.abs(gap) > _TOUCHES * slave.facet_size, gap, 0.0)
+
+
 def _on_rigid(
     continuum: Continuum, interface: Interface, master: RigidSurface, *, cracks: bool
 ) -> Pair:
@@ -296,7 +312,7 @@ def _on_rigid(
         masters=np.zeros((n, 0), dtype=np.int64),
         weights=np.zeros((n, 0)),
         frames=local_frames(normals, continuum.gdim),
-        gap=gap if interface.gap == "keep" else np.zeros(n),
+        gap=_kept_gaps(interface, slave, gap),
         bonded=bonded,
         friction=friction_of(interface, slave),
         master_maps=None if maps is None else np.zeros((n, 0, *maps.shape[1:])),
