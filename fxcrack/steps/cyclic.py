@@ -44,7 +44,6 @@ from fxcrack.steps.partial_growth import (
     PartialGrowth,
     attach_ligaments,
     grows_in_part,
-    passed_area,
 )
 from fxcrack.steps.release import release_tips
 from fxcrack.steps.static import Static
@@ -144,16 +143,6 @@ class _Cycling:
             if len(v.tips):
                 for name in ("G_max", "dG", "dadN"):
                     row[f"{name}[{g.title}]"] = float(cycle.column(name)[v.largest])
-        if self._partly:
-            for g, v in self._analysis.at_tips():
-                passed = passed_area(self._analysis, g, v)
-                area = g.extent.area(v.tips) + passed
-                row[f"area[{g.title}]"] = area
-                grown = g.extent.over_front(passed)
-                if g.front.surface.dim == 1:
-                    part = self._analysis.fatigue.ligaments[g.p].part[v.tips.node]
-                    grown = float((part * advance(v.tips)).max(initial=0.0))
-                row[f"a[{g.title}]"] = g.extent.length(v.tips) + grown
         return row
 
     def _go_to_maximum(self, path: LoadPath) -> int:

@@ -184,6 +184,21 @@ def advance(tips: Tips) -> Array:
     return np.where(tips.d_ahead > 0.0, tips.d_ahead, tips.area / tips.width)
 
 
+def with_passed_parts(crack: Crack, tips: Tips, part: Array) -> tuple[float, float]:
+    """Length and area of a crack with the elements that its front has passed in part.
+
+    Args:
+        crack: The crack.
+        tips: Its tips.
+        part: Part of the element ahead of each tip, shape (n_tips,).
+    """
+    passed = float(part @ tips.area)
+    grown = crack.extent.over_front(passed)
+    if crack.front.surface.dim == 1:
+        grown = float((part * advance(tips)).max(initial=0.0))
+    return crack.extent.length(tips) + grown, crack.extent.area(tips) + passed
+
+
 def lengths_of(crack: Crack, tips: Tips) -> list[float]:
     """Crack length of each tip: its own on a line, the mean of the front on a surface."""
     mean = crack.extent.length(tips)

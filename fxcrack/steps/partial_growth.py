@@ -154,11 +154,6 @@ def _why_by_node(analysis: Analysis) -> str:
     return "credit=True" if any(c.credit for c in criteria) else ""
 
 
-def passed_area(analysis: Analysis, g: Crack, values: TipValues) -> float:
-    """Area of elements that the front of a crack has passed in part, length^2."""
-    return float(analysis.fatigue.ligaments[g.p].part[values.tips.node] @ values.tips.area)
-
-
 class PartialGrowth:
     """Advance of fronts through their elements.
 
@@ -223,6 +218,8 @@ class PartialGrowth:
         while True:
             event, seen = self._block(seen)
             if event is not None:
+                # fronts have moved since tips were found
+                self._analysis.evaluate_tips()
                 return Block(event, seen)
 
     # -- one block -------------------------------------------------------------------------

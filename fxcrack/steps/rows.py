@@ -9,6 +9,7 @@ from fxcrack.history import Row
 from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
+from fxcrack.steps.element_growth import with_passed_parts
 from fxcrack.steps.shared_numbers import columns_of_shared, is_shared
 
 Observer = Callable[[str, Row], None]
@@ -108,8 +109,13 @@ def history_row(analysis: Analysis, event: str) -> Row:
         row[volume] = float(row[volume]) + fluid.more_volume()
     row |= columns_of_shared(solver, state.loads, state.conjugate, monitored)
     for g, v in analysis.at_tips():
-        row[f"a[{g.title}]"] = g.extent.length(v.tips)
-        row[f"area[{g.title}]"] = g.extent.area(v.tips)
+        length, area = g.extent.length(v.tips), g.extent.area(v.tips)
+        ligaments = analysis.fatigue.ligaments.get(g.p)
+        if ligaments is not None and len(v.tips):
+            passed = ligaments.part[v.tips.node]
+            if passed.any():
+                length, area = with_passed_parts(g, v.tips, passed)
+        row[f"a[{g.title}]"], row[f"area[{g.title}]"] = length, area
         row[f"released[{g.title}]"] = g.n_released
         row |= critical_columns(g, v)
     row |= stored

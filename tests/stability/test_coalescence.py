@@ -86,7 +86,9 @@ def test_body_that_comes_free(law: str) -> None:
         ),
         criterion=fx.VCCT(GIc=0.2, unstable_tolerance=np.inf),
     )
-    scene.debonds[0] = fx.Debond(scene.debonds[0].interface, scene.debonds[0].criterion, LAWS[law])
+    scene.analysis.debonds[0] = fx.Debond(
+        scene.debonds[0].interface, scene.debonds[0].criterion, LAWS[law]
+    )
     history = watched(scene, until=fx.Releases(99))
     assert history.reason.startswith("total separation: ")
     assert history.reason.endswith("the step ends in the last equilibrium before it")

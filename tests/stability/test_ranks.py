@@ -51,7 +51,7 @@ def test_front_crosses_borders(
             supports=CLAMPED_3D,
             criterion=fx.VCCT(GIc=0.2, method=method),
         )
-        scene.debonds[0] = fx.Debond(
+        scene.analysis.debonds[0] = fx.Debond(
             scene.debonds[0].interface, scene.debonds[0].criterion, release
         )
         histories.append(scene.run(fx.Static(until=fx.Releases(60)), progress=False))
