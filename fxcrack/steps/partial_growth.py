@@ -81,6 +81,13 @@ def attach_ligaments(analysis: Analysis) -> None:
             "would rub; leave friction or partial=True out"
         )
     for g in analysis.active:
+        method = cyclic_parts(g)[0].method
+        if method != "vcct":  # another interface has partial=True, and this one no word on it
+            raise InputError(
+                f"interface '{g.title}': Fatigue(method='{method}') cannot grow in part, but "
+                "another interface has Fatigue(partial=True); give both method='vcct' or "
+                "partial=False, or let them grow in steps of their own, grow=[...]"
+            )
         if analysis.continuum.order > 1:
             raise InputError(
                 f"interface '{g.title}': Fatigue(partial=True) is available for first-order "
