@@ -93,7 +93,7 @@ def attach_ligaments(analysis: Analysis) -> None:
             if slender > _SLENDER:
                 log.warn(
                     "interface '%s': elements at the front are %.3g times as long in the growth "
-                    "direction as they are wide; growing in part (Fatigue(partial=True), the "
+                    "direction as they are wide; with growth in part (partial=True, the "
                     "default in 3-D) lives then depend on the mesh by more than 10 %%: make them "
                     "at most as long as wide",
                     g.title,
