@@ -186,15 +186,15 @@ def test_an_increment_that_is_undone_gives_the_old_pairing_back() -> None:
     model.renew_pairs()
     model.settle(model.state.force)
     state, saved, u = model.state, model.remember(), model.u.array.copy()
-    pair, energy = model.pairs[0], model.pairing.energy
+    pair, energy = model.pairs[0], model.accepted.pairing.energy
     model.move(scene.loads_at(1.5), state.force, 1.5, 0.2)
     model.commit()
     assert model.renew_pairs()
     model.settle(model.state.force)
-    assert model.pairs[0] is not pair and model.pairing.energy != energy
+    assert model.pairs[0] is not pair and model.accepted.pairing.energy != energy
     model.state = state
     model.recall(saved)
-    assert model.pairs[0] is pair and model.pairing.energy == energy
+    assert model.pairs[0] is pair and model.accepted.pairing.energy == energy
     # the equilibrium is found anew, to 1e-10 of the forces
     assert model.u.array == pytest.approx(u, abs=1e-9 * np.abs(u).max())
     assert model.state.jump == pytest.approx(state.jump, abs=1e-9 * np.abs(u).max())

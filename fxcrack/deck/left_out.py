@@ -152,11 +152,12 @@ def _point_masses(cards: Sequence[Card], report: Report) -> list[Card]:
             card.keyword == "DLOAD" and any(squeeze(row.text(1)) in loads for row in card.rows())
         )
 
-    if any(accelerates(card) for card in cards):
-        return list(cards)
+    counts = any(accelerates(card) for card in cards)
     kept: list[Card] = []
     for card in cards:
-        if card.keyword in _POINT_MASSES:
+        if card.keyword in _POINT_MASSES and counts:
+            report.refused.append(_refusal(card, cards))
+        elif card.keyword in _POINT_MASSES:
             report.replace(
                 "point masses play no part in static steps without gravity; left out", card
             )
@@ -167,6 +168,30 @@ def _point_masses(cards: Sequence[Card], report: Report) -> list[Card]:
         else:
             kept.append(card)
     return kept
+
+
+def _refusal(card: Card, cards: Sequence[Card]) -> str:
+    """Why a point mass is refused: how large it is, and where."""
+    size = card.rows()[0].number(0, 0.0) if card.rows() else 0.0
+    name = key(card.options.get("ELSET") or "")
+    nodes = [
+        row.text(1)
+        for other in cards
+        if other.keyword == "ELEMENT"
+        and other.word("TYPE") in _POINT_MASSES
+        and key(other.options.get("ELSET") or "") == name
+        for row in other.rows()
+    ]
+    what = "a point mass" if card.keyword == "MASS" else "a rotary inertia"
+    where = f" at each of {len(nodes)} nodes" if len(nodes) > 1 else "".join(
+        f" at node {node}" for node in nodes
+    )  # fmt: skip
+    return (
+        f"{card.place}: {card.title} is refused: {what} of {size:g}{where} is not available, and "
+        "the bodies would move without it; give it to elements beside the node by *DENSITY. Where "
+        "the node is held, or its motion prescribed, it changes the reaction of the node alone: "
+        "take the card and its element out"
+    )
 
 
 __all__ = ["OF_INTERACTIONS", "OF_MATERIALS", "without_unused"]

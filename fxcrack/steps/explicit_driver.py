@@ -16,6 +16,7 @@ from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.driver import CheckpointPoint, why_ended
 from fxcrack.steps.explicit import Explicit
 from fxcrack.steps.explicit_increments import Increments
+from fxcrack.steps.explicit_range import LinearRange
 from fxcrack.steps.explicit_release import ReleaseControl
 from fxcrack.steps.explicit_rows import CrackSpeed, explicit_row, imbalance
 from fxcrack.steps.rows import Observer
@@ -76,6 +77,7 @@ class ExplicitDriver:
         self._adapts = changes and step.dt is None
         self._may_become_unstable = changes and not self._adapts
         self._told = False
+        self._range = LinearRange(solver, analysis.said)
         self._good: tuple[Any, list[int], int] | None = None
         self._may_overlap = np.zeros(solver.lumped.n_rows, dtype=bool)
         for pair, rows in zip(solver.pairs, solver.row_of, strict=True):
@@ -208,6 +210,7 @@ class ExplicitDriver:
         if not off <= limit:
             return self._stop(off, limit)
         self._warn_of_overlap()
+        self._range.look()
         if self._may_become_unstable and event == "increment":
             stable = self.solver.renew_stable_increment()
             if stable < self.solver.dt:
