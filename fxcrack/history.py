@@ -32,7 +32,7 @@ import numpy.typing as npt
 from mpi4py import MPI
 
 from fxcrack.base import log
-from fxcrack.base.checks import number, text
+from fxcrack.base.checks import counted, number, text
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -137,14 +137,14 @@ class History:
         By a slice such as ``history[-3:]`` it is a list of rows.
 
         Raises:
-            InputError: No row has the column, or it is neither a name nor a number.
+            InputError: No row has the column, or it is neither a name nor a number nor a slice.
             IndexError: There are fewer rows.
         """
-        if isinstance(column, int | np.integer):
-            return self.rows[int(column)]
         if isinstance(column, slice):
             return self.rows[column]
-        text("history[...]", "a column", column)
+        if isinstance(column, int | np.integer):
+            return self.rows[int(column)]
+        text("history", "column", column)
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])
@@ -286,7 +286,7 @@ class History:
             a, released = self[f"a[{title}]"].astype(float), self[f"released[{title}]"]
             lines.append(
                 f"crack {title}: length from {a[0]:.6g} to {a[-1]:.6g}, "
-                f"{int(released[-1])} nodes released"
+                f"{counted(int(released[-1]), 'node')} released"
             )
             f = self[f"f[{title}]"].astype(float) if f"f[{title}]" in names else np.zeros(len(a))
             unstable = (self["event"] == "unstable") & (f > 1.0 + AT_ONE)
@@ -359,7 +359,10 @@ class History:
 
     def write_csv(self, path: str | Path) -> None:
         """As :meth:`to_csv`, on one rank alone."""
-        with replacing(path) as temporary, temporary.open("w", newline="") as stream:
+        with (
+            replacing(path) as temporary,
+            temporary.open("w", newline="", encoding="utf-8") as stream,
+        ):
             writer = csv.DictWriter(stream, self.columns)
             writer.writeheader()
             writer.writerows(self.rows)
@@ -368,7 +371,7 @@ class History:
         """As :meth:`to_json`, on one rank alone."""
         content = {"reason": self.reason, "details": self.details, "rows": self.rows}
         with replacing(path) as temporary:
-            temporary.write_text(json.dumps(content, indent=1))
+            temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
 
     def plot(
         self,

@@ -332,7 +332,7 @@ class Scene:
             self.history,
             first,
             refused=np.inf if free else REFUSED,
-            round_off=solver.energy_noise if isinstance(solver, NewtonSolver) else 0.0,
+            round_off=solver.accepted.energy_noise if isinstance(solver, NewtonSolver) else 0.0,
         )
         if accuracy is not None and not isinstance(step, Explicit):
             self.history.details["accuracy"] = as_details(demand(self, step, accuracy, chosen))

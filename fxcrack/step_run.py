@@ -177,28 +177,32 @@ def run_step(
     except NotPositiveDefinite as error:
         raise SolverError(held_by_contact(error.why)) from error
     analysis.history.details = _details(analysis)
-    if isinstance(analysis.solver, LinearSolver) and not isinstance(step, Explicit):
-        # not worth a factorisation of its own, which a direct solver needs on several ranks
-        if analysis.solver.recovers_displacement:
-            u = analysis.solver.displacement()
-            now = u.array_r.copy()
-            u.destroy()
-            if not isinstance(analysis.continuum, ShellBodies):
-                warn_of_range(analysis.continuum, now, analysis.said)
-            if analysis.continuum.temperature is not None:
-                analysis.continuum.temperature.set(analysis.time)
-            warn_of_second_order(analysis.solver, now, analysis.said)
-    if any(getattr(m, "form", "") == "plastic" for m in analysis.continuum.part_materials):
-        u = analysis.solver.displacement()
-        now = u.array_r.copy()
-        u.destroy()
-        warn_of_large_strain(analysis.continuum, now, analysis.said)
-    constraints = analysis.solver.supports.constraints
-    if constraints and is_finite(analysis.continuum, analysis.effects):
-        u = analysis.solver.displacement()
-        warn_of_turns(analysis.continuum, constraints, u.array_r.copy())
-        u.destroy()
+    _warn_of_displacement(analysis)
     return first
+
+
+def _warn_of_displacement(analysis: Analysis) -> None:
+    """Warn where the displacement at the end of a step is beyond what was assumed; collective."""
+    solver, continuum = analysis.solver, analysis.continuum
+    # not worth a factorisation of its own, which a direct solver needs on several ranks
+    linear = isinstance(solver, LinearSolver) and solver.recovers_displacement
+    plastic = any(getattr(m, "form", "") == "plastic" for m in continuum.part_materials)
+    constraints = solver.supports.constraints if is_finite(continuum, analysis.effects) else ()
+    if not (linear or plastic or constraints):
+        return
+    u = solver.displacement()
+    now = u.array_r.copy()
+    u.destroy()
+    if isinstance(solver, LinearSolver) and linear:
+        if not isinstance(continuum, ShellBodies):
+            warn_of_range(continuum, now, analysis.said)
+        if continuum.temperature is not None:
+            continuum.temperature.set(analysis.time)
+        warn_of_second_order(solver, now, analysis.said)
+    if plastic:
+        warn_of_large_strain(continuum, now, analysis.said)
+    if constraints:
+        warn_of_turns(continuum, constraints, now)
 
 
 def _check_lengths(analysis: Analysis, step: Static | Cycles | Explicit) -> None:

@@ -175,8 +175,8 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     "quick" has the tests marked "three" that are not slow: of those without parameters every other
     one runs on 2 ranks and the rest on 3, and so do the parameters of a test. "slow" has what is
     left: tests of the quick run without parameters, on the number of ranks they did not have, and
-    the slow ones. Of these, 3 ranks have every third test of a file that has no parameters, and
-    every third parameter (of two the first): they share the two cores of a small machine and take
+    the slow ones. Of these, 3 ranks have every fourth test of a file that has no parameters, and
+    every fourth parameter (of two the first): they share the two cores of a small machine and take
     three times as long as 2 ranks, which have all tests without parameters and the other
     parameters. What bears the mark "each" is not spread.
     """
@@ -203,10 +203,10 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
                 here |= set(quick)
             slow = [item for item in same if not _is_quick_on_ranks(item)]
             if len(slow) == 1:
-                here |= set(slow) if WORLD.size == 2 or singles % 3 == 0 else set()
+                here |= set(slow) if WORLD.size == 2 or singles % 4 == 0 else set()
                 singles += 1
             else:
-                every = 2 if len(slow) == 2 else 3
+                every = 2 if len(slow) == 2 else 4
                 here |= {x for i, x in enumerate(slow) if (i % every == 0) == (WORLD.size == 3)}
     config.hook.pytest_deselected(items=[item for item in items if item not in here])
     items[:] = [item for item in items if item in here]

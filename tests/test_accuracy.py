@@ -110,10 +110,7 @@ def test_nothing_hangs_and_a_failure_does_not_end_the_study(own: str) -> None:
     ):
         workers.run(setting, 5.0)
     assert time.monotonic() - begin < 20.0
-    with closing(Workers(f"{own}:wrong")) as workers:
-        for ranks in (1, 2):
-            with pytest.raises(SettingFailed, match="ZeroDivisionError: by design"):
-                workers.run(replace(setting, ranks=ranks), 30.0)
+    # one that fails on its only rank: below
     two = replace(setting, ranks=2)
     for rank, name in enumerate(("first_wrong", "second_wrong")):  # the other one waits for it
         with closing(Workers(f"{own}:{name}")) as workers:

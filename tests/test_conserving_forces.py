@@ -137,14 +137,16 @@ def test_a_spinning_body_keeps_energy_and_moment_of_momentum(
         return float(comm.allreduce(mine, op=MPI.SUM))
 
     energy, spin = total(), moment()
-    for i in range(60):
+    strained = 0.0
+    for i in range(60 if comm.size == 1 else 15):  # half a turn on several ranks
         bodies.begin(0.1 * (i + 1), 0.1)
         solve(bodies, [], tolerance=1e-13, most=60)
         bodies.commit()
         # the iteration leaves 1e-13 of the forces
         assert total() == pytest.approx(energy, rel=1e-10)
         assert moment() == pytest.approx(spin, rel=1e-10)
-    assert bodies.stored()["strain_energy"] > 1e-3 * energy
+        strained = max(strained, bodies.stored()["strain_energy"])
+    assert strained > 1e-3 * energy
     assert sum(bodies.spent().values()) == pytest.approx(0.0, abs=1e-10 * energy)
     bodies.destroy()
 

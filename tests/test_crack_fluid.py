@@ -175,7 +175,7 @@ def test_growth_under_injected_volume(comm: MPI.Intracomm) -> None:
 
     A soft body is blown up (openings of a tenth of the radius), which stiffens it.
     """
-    step = fx.Static(until=fx.Releases(2), **VOLUME)
+    step = fx.Static(until=fx.Releases(1), **VOLUME)
     small, stiff = (
         onsets(inflated(comm, 1e5, finite=f).run(step, progress=False)) for f in (False, True)
     )

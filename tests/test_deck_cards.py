@@ -204,8 +204,8 @@ def test_large_blocks_are_read_by_numpy(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_million_nodes_are_read_in_ten_seconds(tmp_path):
-    n = 1000
+def test_a_quarter_of_a_million_nodes_are_read_in_two_and_a_half_seconds(tmp_path):
+    n = 500
     i = np.arange(n * n)
     x, y = i % n, i // n
     e = np.arange((n - 1) ** 2)
@@ -226,5 +226,5 @@ def test_a_million_nodes_are_read_in_ten_seconds(tmp_path):
     assert len(model.root.nodes.labels) == n * n
     found = translate(model, Report("model.inp"))
     assert found.raw.points.shape == (n * n, 2) and found.raw.cells.shape == ((n - 1) ** 2, 4)
-    # the required 10 s for the text (3 s when alone); with the mesh of the scene as well
-    assert read_in < 10.0 and time.process_time() - start < 20.0
+    # the required 10 s for the text of a million (3 s when alone); with the mesh as well
+    assert read_in < 2.5 and time.process_time() - start < 5.0

@@ -5,15 +5,20 @@ from __future__ import annotations
 import logging
 from dataclasses import replace
 from functools import cache
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from mpi4py import MPI
 
 import fxcrack as fx
+from fxcrack.criteria.evaluator import TipValues
+from fxcrack.equilibrium.cohesive_law import CohesiveUnit
+from fxcrack.interface.tips import Tips
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
 from fxcrack.output.explain import explain
+from fxcrack.steps.crack import joined_units
 from fxcrack.steps.release_choice import choose_release
 
 STEEL = fx.Isotropic(70e3, 0.3)
@@ -77,12 +82,16 @@ def test_where_progressive_release_is_the_default() -> None:
         ),
         ("friction", {}, EVENT, STEP, "friction (interface 'bond')"),
         ("friction", {}, explicit, PROGRESSIVE, ""),
+        ("smooth", {}, EVENT, PROGRESSIVE, ""),
+        ("smooth everywhere", {}, EVENT, PROGRESSIVE, ""),
         ("plane", {}, EVENT, STEP, ""),
         ("plane", {}, explicit, PROGRESSIVE, ""),
     ]
     scenes = {
         "3-D": arms(),
         "friction": arms(contact=True, friction=0.3),
+        "smooth": arms(contact=True, friction=0.0),
+        "smooth everywhere": arms(contact=True, friction=lambda x: 0.0 * x[0]),
         "plane": arms(flat=True),
     }
     for where, given, step, law, why in wanted:
@@ -92,6 +101,20 @@ def test_where_progressive_release_is_the_default() -> None:
         assert (found.law, found.why_at_once) == (law, why), (where, given, step)
     for scene in scenes.values():
         scene.close()
+
+
+def test_round_off_does_not_decide_which_nodes_soften_by_one_law() -> None:
+    """Of four nodes critical together two are pressed; their f differ by round-off only."""
+    expected = {(1, 2): 3.0, (3, 4): 7.0, (5,): 5.0}
+    for order in ((1, 2, 3, 4), (1, 3, 2, 4), (4, 1, 3, 2)):
+        f = np.full(5, 0.9)
+        f[np.array(order) - 1] = 1.0 - 1e-15 * np.arange(4)
+        nodes = np.arange(1, 6)
+        values = TipValues(cast(Tips, SimpleNamespace(node=nodes)), f, {})
+        units = [CohesiveUnit(np.array([k]), float(k), k in (3, 4), 1.0) for k in nodes]
+        found = joined_units(units, values)
+        assert {tuple(u.nodes.tolist()): u.energy for u in found} == expected
+        assert [u.area for u in found] == [float(len(u.nodes)) for u in found]
 
 
 @pytest.mark.mpi

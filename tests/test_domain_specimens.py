@@ -3,11 +3,12 @@
 End-notched flexure under a given force: G_II = 9 P^2 (a + 0.42 chi h)^2/(16 b^2 E' h^3), corrected
 beam theory (Wang and Williams 1992; chi = 0.663 in plane strain at nu = 0.3). The converged
 solution of the specimen is 0.989 of it. Penny-shaped crack under tension: Sneddon (1946), under
-shear: Segedin (1951). Elliptical crack: Irwin (1962).
+shear: Segedin (1951). Elliptical crack: Irwin (1962). Along an arc: Cotterell and Rice (1980).
 """
 
 from __future__ import annotations
 
+from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -26,6 +27,7 @@ from fxcrack.criteria.virtual_extension import FrontLine
 from fxcrack.demos import tet_penny
 from fxcrack.interface.front_cells import FrontCells
 from fxcrack.interface.tips import Tips
+from fxcrack.mesh.read import gmsh_model
 from fxcrack.meshes.dcb import dcb_3d
 from fxcrack.meshes.enf import enf_2d
 from fxcrack.meshes.tet_penny import tet_penny as tet_mesh
@@ -64,6 +66,73 @@ def test_pressure_on_faces_between_second_order_triangles() -> None:
     # measured 4e-5; VCCT is 2.7 % short
     row = plate(INFLATED, domain(), order=2, cell="triangle")
     assert float(row["GI[bond]"]) == pytest.approx(np.pi * (1.0 - NU**2) / E * WIDE, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_crack_along_an_arc() -> None:
+    """A crack over 90 degrees of a circle, biaxial tension (Cotterell and Rice 1980).
+
+    Measured at 4 elements per half arc and 3 rings: 0.1 and 0.8 %. With sides told by the tangent
+    plane and faces taken as straight K_II is 10 % off.
+    """
+    half, reach = np.radians(45.0), np.radians(75.0)
+    with gmsh_model("arc") as gmsh:
+        occ, far = gmsh.model.occ, 10.0
+        plate_ = occ.addRectangle(-far, -far, 0.0, 2.0 * far, 2.0 * far)
+        centre = occ.addPoint(0.0, 0.0, 0.0)
+        angles = np.array([-reach, -half, 0.0, half, reach])
+        points = [occ.addPoint(np.sin(t), np.cos(t), 0.0) for t in angles]
+        arcs = [occ.addCircleArc(a, centre, b) for a, b in pairwise(points)]
+        _, parts = occ.fragment([(2, plate_)], [(1, arc) for arc in arcs])
+        occ.synchronize()
+        line = [tag for part in parts[1:] for _, tag in part]
+        sides = {"top": (1, far), "bottom": (1, -far), "right": (0, far), "left": (0, -far)}
+        for name, (axis, at) in sides.items():
+            found = [
+                tag
+                for _, tag in gmsh.model.getEntities(1)
+                if abs(occ.getCenterOfMass(1, tag)[axis] - at) < 1e-6
+            ]
+            gmsh.model.addPhysicalGroup(1, found, name=name)
+        corners = {"corner": (-far, -far), "other": (far, -far)}
+        for name, where in corners.items():
+            found = [
+                tag
+                for _, tag in gmsh.model.getEntities(0)
+                if np.allclose(gmsh.model.getValue(0, tag, [])[:2], where)
+            ]
+            gmsh.model.addPhysicalGroup(0, found, name=name)
+        gmsh.model.addPhysicalGroup(2, [tag for _, tag in parts[0]], name="body")
+        gmsh.model.addPhysicalGroup(1, line, name="line")
+        tip = np.array([np.sin(half), np.cos(half)])
+
+        def size(dim: int, tag: int, x: float, y: float, z: float, given: float) -> float:
+            away = float(np.hypot(abs(x) - tip[0], y - tip[1]))
+            return min(4.0, 0.15 + 0.3 * max(0.0, away - 0.5))
+
+        gmsh.model.mesh.setSizeCallback(size)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+        gmsh.model.mesh.generate(2)
+        gmsh.model.mesh.setOrder(2)
+        mesh = fx.mesh_from_gmsh(
+            gmsh.model, MPI.COMM_SELF, split=[fx.Split("line", "above", "below", (0.0, 1.0))]
+        )
+    crack = fx.Interface(
+        "above", "below", lambda x: np.abs(np.arctan2(x[0], x[1])) >= half - 1e-9, name="crack"
+    )
+    loads = {"top": (0.0, 1.0), "bottom": (0.0, -1.0), "right": (1.0, 0.0), "left": (-1.0, 0.0)}
+    scene = fx.Scene(
+        mesh, materials=fx.Isotropic(E, NU), model=fx.PlaneStrain(),
+        supports=[fx.Displacement("corner", x=0.0, y=0.0), fx.Displacement("other", y=0.0)],
+        loads=[fx.Traction(name, value) for name, value in loads.items()],
+        debonds=[fx.Debond(crack, domain())],
+    )  # fmt: skip
+    row = scene.run(fx.Static(until=fx.Time(1.0)), progress=False)[-1]
+    scene.close()
+    part = np.sin(0.5 * half)
+    size_ = np.sqrt(np.pi * np.sin(half)) / (1.0 + part**2)
+    assert float(row["KI[crack]"]) == pytest.approx(size_ * np.cos(0.5 * half), rel=0.015)
+    assert abs(float(row["KII[crack]"])) == pytest.approx(size_ * part, rel=0.02)
 
 
 IN_CYLINDER = 1.0054

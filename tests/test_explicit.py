@@ -249,7 +249,7 @@ def test_slow_loading_is_quasi_static() -> None:
 @pytest.mark.slow
 def test_the_implicit_step_has_the_same_history_at_the_same_increments() -> None:
     """Release by the same law: with one mass and one increment, what is left is the integration."""
-    speed, dt, lengths = 8e3, 8e-8, (31.0, 32.0, 33.0)
+    speed, dt, lengths = 8e3, 8e-8, (31.0, 32.0)
     found = []
     for explicit in (True, False):
         # the default of the implicit step is a release at once
@@ -257,9 +257,9 @@ def test_the_implicit_step_has_the_same_history_at_the_same_increments() -> None
             MPI.COMM_SELF, speed, effects=[fx.Inertia(lumped=True)], release=fx.ProgressiveRelease()
         )
         if explicit:
-            step: Any = until(scene, 33.0, 1.3e-4, rows=5000, dt=dt)
+            step: Any = until(scene, lengths[-1], 1.3e-4, rows=5000, dt=dt)
         else:
-            ends = [fx.CrackLength(interface_of(scene), 33.0), fx.Time(1.3e-4)]
+            ends = [fx.CrackLength(interface_of(scene), lengths[-1]), fx.Time(1.3e-4)]
             step = fx.Dynamic(until=ends, dt=dt)
         found.append(opening_at(scene.run(step), speed, lengths))
         scene.close()

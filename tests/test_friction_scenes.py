@@ -63,6 +63,13 @@ def test_what_friction_cannot_be_is_said(options: dict[str, Any], message: str) 
         fx.Interface("upper_face", "lower_face", **options)
 
 
+def test_a_coefficient_of_zero_is_no_friction() -> None:
+    plane = fx.RigidPlane((0.0, 0.0), (0.0, 1.0))
+    fx.Interface("upper_face", "lower_face", friction=0.0)
+    fx.Interface("upper_face", "lower_face", friction=0, contact=True, normal_only=True)
+    fx.Interface("upper_face", plane, friction=0.0, symmetry=True)
+
+
 @pytest.mark.mpi
 def test_a_function_gives_the_coefficient_and_is_checked(comm: MPI.Intracomm) -> None:
     scene = block(comm, lambda x: 0.1 * x[0])

@@ -155,6 +155,20 @@ def test_a_crack_that_stops_for_good_ends_in_the_state_of_its_last_release() -> 
     assert largest_imbalance(history) < 1e-9
 
 
+def test_a_weak_beginning_does_not_end_the_growth() -> None:
+    # f ahead of it is 1e-9/0.2 of 1 after the last weak bond, but no round-off
+    weak, plain = (
+        dcb(MPI.COMM_SELF, dx=1.0, ny=2, a0=a0, criterion=fx.VCCT(GIc=toughness))
+        for a0, toughness in ((30.0, lambda x: np.where(x[0] < 31.5, 1e-9, 0.2)), (32.0, 0.2))
+    )
+    history = weak.run(fx.Static(until=fx.Releases(4)), progress=False)
+    expected = plain.run(fx.Static(until=fx.Releases(2)), progress=False)
+    assert history.reason == "4 nodes released"
+    loads, wanted = ([r["R[pin_top.y]"] for r in onsets(h)] for h in (history, expected))
+    assert loads[-2:] == pytest.approx(wanted, rel=1e-9)
+    assert largest_imbalance(history) < 1e-9
+
+
 def test_softening_bonds_are_as_they_were_where_the_search_began() -> None:
     scene = dcb(
         MPI.COMM_SELF, dx=1.0, ny=2, release=fx.ProgressiveRelease(),

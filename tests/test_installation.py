@@ -163,12 +163,9 @@ def test_distributions_are_whole(tmp_path: Path) -> None:
         archive.extractall(tmp_path / "unpacked", filter="data")
     wheel = build("build_wheel", next((tmp_path / "unpacked").iterdir()))
     fresh = tmp_path / "fresh"
-    venv.create(fresh, with_pip=True)
-    subprocess.run(
-        [fresh / "bin/pip", "install", "-q", "--no-index", "--no-deps", wheel],
-        check=True,
-        capture_output=True,
-    )
+    venv.create(fresh)
+    into = [sys.executable, "-m", "pip", "--python", fresh / "bin/python", "install", "-q"]
+    subprocess.run([*into, "--no-index", "--no-deps", wheel], check=True, capture_output=True)
     # The libraries are those of this environment; its own .pth files, one of which would lead to
     # the sources here, are not read.
     packages = next((fresh / "lib").glob("python*/site-packages"))

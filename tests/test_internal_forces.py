@@ -13,6 +13,7 @@ from fxcrack.continuum import block_product
 from fxcrack.continuum.block_product import BlockProduct, fast_product
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.continuum.stiffness_rows import StiffnessRows
 from fxcrack.meshes.dcb import dcb_3d
 
 
@@ -60,6 +61,30 @@ def test_block_products_are_those_of_the_matrix(size: int) -> None:
     assert product.into(x, np.ones(len(y))) == pytest.approx(3.0 * dense @ x, rel=1e-13, abs=1e-13)
     none = fast_product(sp.csr_matrix((0, 2 * size)), size, MPI.COMM_SELF)
     assert none(np.ones(2 * size)).shape == (0,)
+
+
+@pytest.mark.parametrize("size", [1, 2, 3])
+def test_rows_of_a_symmetric_matrix(size: int) -> None:
+    """Rows wanted by node and by dof, columns of other ranks; half of what is square is stored."""
+    random = np.random.default_rng(3)
+    n, more = 11, 4
+    dense = random.standard_normal((n * size, (n + more) * size))
+    dense *= np.kron(random.random((n, n + more)) < 0.4, np.ones((size, size)))
+    square = dense[:, : n * size]
+    square += square.T + np.eye(n * size)
+    wanted = np.ones(n * size, dtype=bool)
+    wanted[3 * size : 4 * size] = wanted[6 * size] = False
+    rows = StiffnessRows(sp.csr_matrix(dense), wanted, size, MPI.COMM_SELF)
+    u, v = random.standard_normal((n + more) * size), random.standard_normal(n * size)
+    forces = np.where(wanted, dense @ u, 0.0)
+    # round-off of sums of some ten terms
+    close = {"rel": 1e-13, "abs": 1e-13}
+    assert rows(u) == pytest.approx(forces, **close)
+    factors = random.standard_normal(n * size)
+    for _ in range(2):  # nothing is left of the first
+        moved = v.copy()
+        rows.push(u, factors, moved)
+        assert moved == pytest.approx(v + factors * forces, **close)
 
 
 def test_products_take_those_of_scipy_where_there_is_no_compiler(

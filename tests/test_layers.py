@@ -140,3 +140,21 @@ def test_nothing_cites_a_file_that_is_not_here() -> None:
         cited = set(re.findall(r"[\w/-]+\.md\b", " ".join(texts)))
         found |= {f"{path.relative_to(ROOT)}: {c}" for c in cited if not (ROOT / c).is_file()}
     assert sorted(found) == []
+
+
+def test_text_files_have_one_encoding_whatever_the_locale_is() -> None:
+    found = []
+    for path in sorted((ROOT / "fxcrack").rglob("*.py")):
+        text = path.read_text(encoding="utf-8")
+        if not re.search(r"(write|read)_text\(|\bopen\(", text):
+            continue
+        for node in ast.walk(ast.parse(text)):
+            if not isinstance(node, ast.Call):
+                continue
+            name, given = ast.unparse(node.func).rpartition(".")[2], [k.arg for k in node.keywords]
+            written = name == "open" and any(
+                isinstance(a, ast.Constant) and a.value in ("w", "a", "x") for a in node.args
+            )
+            if (written or name in ("write_text", "read_text")) and "encoding" not in given:
+                found.append(f"{path.relative_to(ROOT)}:{node.lineno}")
+    assert found == []

@@ -454,3 +454,6 @@ def test_history_as_csv_and_json(comm: MPI.Comm, shared_path: Path) -> None:
     np.testing.assert_array_equal(history["f[bond]"], [np.nan, 1.0])
     with pytest.raises(fx.InputError, match="no column 'g'"):
         history["g"]
+    assert history[1:] == history.rows[1:]
+    with pytest.raises(fx.InputError, match="column = None must be a name"):
+        history[None]  # type: ignore[call-overload]

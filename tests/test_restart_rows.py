@@ -123,22 +123,26 @@ def test_restart_from_rows(name: str, comm: MPI.Intracomm, shared_path: Path) ->
     whole = scene.run(step, progress=False)
     scene.close()
     assert whole.rows[-1]["released[b]"] >= 1
-    for row in {len(whole) // 3, len(whole) - 2}:
-        checkpoint = fx.Checkpoint(shared_path / f"{row}.npz", every=1)
-        seen: list[str] = []
+    checkpoint = fx.Checkpoint(shared_path / "state.npz", every=1)
 
-        def stop(event: str, _: Any, seen: list[str] = seen, row: int = row) -> None:
-            seen.append(event)
-            if len(seen) > row:
-                raise Stopped
+    def stop(event: str, _: Any) -> None:
+        nonlocal left
+        left -= 1
+        if left < 0:
+            raise Stopped
 
+    # stopped early, continued, stopped late, continued
+    done = 0
+    for row in sorted({len(whole) // 3, len(whole) - 2}):
+        left, again = row - done, done > 0
         scene = make(comm)
         with pytest.raises(Stopped):
-            scene.run(step, checkpoint=checkpoint, progress=False, observers=[stop])
+            scene.run(step, checkpoint=checkpoint, restart=again, progress=False, observers=[stop])
         scene.close()
-        scene = make(comm)
-        close(whole, scene.run(step, checkpoint=checkpoint, restart=True, progress=False))
-        scene.close()
+        done = row
+    scene = make(comm)
+    close(whole, scene.run(step, checkpoint=checkpoint, restart=True, progress=False))
+    scene.close()
 
 
 @pytest.mark.parametrize(("node", "refused"), [(0, False), (1, True)])

@@ -511,7 +511,7 @@ def test_contact_while_the_crack_grows(stepping: str) -> None:
             until=fx.Releases(count), stepping=stepping, initial=0.02, maximum=0.02, max_cutbacks=9
         )
         history = scene.run(step)
-        assert history.reason == f"{count} nodes released"
+        assert history.reason == f"{count} node{'s' if count > 1 else ''} released"
         _, pressure = assert_faces_apart(scene)
     if stepping != "path":
         assert pressure.max() > 0.0 and history.details["contact_steps"] > 0

@@ -111,6 +111,16 @@ def format_point(point: npt.ArrayLike) -> str:
     return "(" + ", ".join(f"{v:.6g}" for v in x.tolist()) + ")"
 
 
+def counted(n: int, what: str) -> str:
+    """A number of things in words of messages, "1 node" or "2 nodes".
+
+    Args:
+        n: How many.
+        what: One of them; an s makes several of it.
+    """
+    return f"{n} {what}" if n == 1 else f"{n} {what}s"
+
+
 def number(owner: str, name: str, value: object) -> float:
     """Return ``value`` as a float; numbers of numpy and arrays of shape () are numbers.
 

@@ -23,7 +23,7 @@ def _memory() -> float:
     found = []
     limit = Path("/sys/fs/cgroup/memory.max")  # a container may have less than its machine
     if limit.exists():
-        text = limit.read_text().strip()
+        text = limit.read_text(encoding="ascii").strip()
         if text.isdigit():
             found.append(float(text) / 1e6)
     try:
@@ -77,7 +77,7 @@ def _peak() -> float:
     status = Path("/proc/self/status")
     if status.exists():
         # not getrusage: a process started by a large one inherits that one's maximum there
-        lines = [line.split() for line in status.read_text().splitlines()]
+        lines = [line.split() for line in status.read_text(encoding="utf-8").splitlines()]
         return next(float(line[1]) for line in lines if line[0] == "VmHWM:") * 1024.0 / 1e6
     unit = 1e6 if sys.platform == "darwin" else 1e6 / 1024.0
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / unit
@@ -86,7 +86,7 @@ def _peak() -> float:
 def reset_peak_memory() -> bool:
     """Let the highest resident size start again from the present one; whether that works."""
     try:
-        Path("/proc/self/clear_refs").write_text("5")
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
     except OSError:
         return False
     return True

@@ -74,7 +74,7 @@ class Constants:
             InputError: It is not such a file.
         """
         try:
-            values: dict[str, Any] = json.loads(path.read_text())
+            values: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
             values["laws"] = {k: Law(**v) for k, v in values["laws"].items()}
             return cls(**values)
         except (OSError, ValueError, TypeError, KeyError) as error:

@@ -22,7 +22,7 @@ from fxcrack.base.arrays import Bools
 from fxcrack.base.errors import InputError
 from fxcrack.interface.front import Front
 from fxcrack.interface.jump_coordinates import FIXED, FREE, RETAINED
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import Pair, with_friction
 
 WAKE_ROWS = 2
 """Rows of open nodes behind the front that stay retained."""
@@ -156,7 +156,7 @@ def choose_roles(
         InputError: Even the smallest useful set exceeds the cap.
     """
     roles, waiting = [], []
-    friction = any(pair.friction is not None for pair in pairs)
+    friction = bool(with_friction(pairs))
     n_fixed = 0
     for p, (pair, front, on, far) in enumerate(zip(pairs, fronts, active, reach, strict=True)):
         ahead, behind = (0.0, 0.0) if around is None else around[p]

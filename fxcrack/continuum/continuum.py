@@ -413,6 +413,17 @@ class Continuum:
             raise InputError(f"group '{where}' of mesh '{self.mesh.name}' holds no node")
         return np.asarray(nodes, dtype=np.int32)
 
+    def mean_position(self, where: str) -> Array:
+        """Mean position of the nodes of a group, undeformed, shape (3,) [length]; collective.
+
+        Raises:
+            InputError: The mesh has no such group, or it holds no node.
+        """
+        nodes = self.owned_nodes(where)
+        total = np.append(self.positions()[nodes].sum(axis=0), len(nodes))
+        total = self.comm.allreduce(total, op=MPI.SUM)
+        return np.asarray(total[:3] / total[3])
+
     def _nodes_of_points(self, points: Ints) -> Ints:
         """Displacement nodes at geometry nodes, for a displacement of the geometry's order."""
         geometry, space = compat.geometry_dofmap(self.mesh.domain), self.space.dofmap.list

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
@@ -17,6 +16,7 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array
 from fxcrack.continuum.continuum import Continuum
+from fxcrack.continuum.follower_work import FollowerWork
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kinematics import Axisymmetric, cofactor
 from fxcrack.continuum.loads import AmplitudeLike, Pressure
@@ -41,9 +41,7 @@ class FollowerPressure(Term):
         self._ds = continuum.surface(load.where)
         self._value = continuum.field(load.value, f"load '{load.title}'")
         self._factor = fem.Constant(domain, PETSc.ScalarType(0.0))
-        self._last_factor = 0.0
-        self._last = np.zeros_like(fem.Function(continuum.space).x.array)
-        self._work = 0.0
+        self._path = FollowerWork(continuum.space)
         self._power: tuple[Any, Any, Any, Any] | None = None
 
     @property
@@ -68,50 +66,40 @@ class FollowerPressure(Term):
         self._factor.value = self._load.amplitude(time)
 
     def path_work(self, u: fem.Function) -> float:
-        """Work along the straight path from the last state; exact, by Simpson's rule.
-
-        Force and displacement are linear on the path, the deformed area at most quadratic.
-        """
+        """Work along the straight path from the last state, exact."""
         c = self._continuum
         if self._power is None:
             factor = fem.Constant(c.mesh.domain, PETSc.ScalarType(0.0))
             at, step = fem.Function(c.space), fem.Function(c.space)
             self._power = factor, at, step, fem.form(-self._form(factor, at, step))
         factor, at, step, form = self._power
-        step.x.array[:] = u.x.array - self._last
-        now = float(self._factor.value)
-        work = 0.0
-        for place, weight in ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0)):
-            factor.value = (1.0 - place) * self._last_factor + place * now
-            at.x.array[:] = self._last + place * step.x.array
-            work += weight * fem.assemble_scalar(form)
+        step.x.array[:] = u.x.array - self._path.u
+
+        def power(place: float, level: float) -> float:
+            factor.value = level
+            at.x.array[:] = self._path.u + place * step.x.array
+            return float(fem.assemble_scalar(form))
+
+        work = self._path.along(float(self._factor.value), power)
         return float(c.comm.allreduce(work, op=MPI.SUM))
 
     def commit(self, u: fem.Function) -> None:
         """Add the work along the straight path from the last state."""
-        self._work += self.path_work(u)
-        self._last[:] = u.x.array
-        self._last_factor = float(self._factor.value)
+        self._path.accept(u, float(self._factor.value), self.path_work(u))
 
     def work(self) -> float:
         """Work of the pressure up to the last commit, force x length; the same on all ranks."""
-        return self._work
+        return self._path.work
 
     def state(self) -> dict[str, Array]:
-        """Displacement and load factor of the last commit, work so far.
-
-        Returns:
-            "last": displacement of the local dofs, ghosts too, shape (n_dofs,), length; "sums":
-            load factor and work (force x length), shape (2,).
-        """
-        return {"last": self._last.copy(), "sums": np.array([self._last_factor, self._work])}
+        """State of the work, shapes as in :meth:`FollowerWork.state`."""
+        return self._path.state()
 
     def places(self) -> dict[str, Place]:
-        """Space of the displacement."""
-        return {"last": self._continuum.space}
+        """Where that state is defined."""
+        return self._path.places()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`, arrays of the same shapes."""
-        self._last[:] = state["last"]
-        self._last_factor, self._work = (float(x) for x in state["sums"])
-        self._factor.value = self._last_factor
+        self._path.restore(state)
+        self._factor.value = self._path.factor

@@ -24,11 +24,10 @@ from petsc4py import PETSc
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.halo import Halo
-from fxcrack.base.sparse import Product
-from fxcrack.continuum.block_product import BlockProduct, fast_product
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kernels import fast_form
+from fxcrack.continuum.stiffness_rows import StiffnessRows
 from fxcrack.continuum.stress import cell_means
 from fxcrack.continuum.term import Term
 from fxcrack.continuum.thermal_strain import is_linear
@@ -174,7 +173,7 @@ class InternalForces:
         self._form: Any = None
         self._energies: dict[str, Any] = {}
         self._matrix: sp.csr_matrix | None = None
-        self._blocks: BlockProduct | Product | None = None
+        self._rows: StiffnessRows | None = None
         self._further: FurtherNodes | None = None
         self._vector = fem.Function(continuum.space)
         self._in_space: fem.Function | None = None
@@ -246,14 +245,15 @@ class InternalForces:
 
     def forget_stiffness(self) -> None:
         """Free the memory of :meth:`stiffness`, which is assembled again where it is needed."""
-        self._matrix = self._blocks = None
+        self._matrix = self._rows = None
 
     def _product(self) -> Array:
-        if self._blocks is None:
+        if self._rows is None:
             continuum = self.continuum
+            every = np.ones(continuum.n_local, dtype=bool)
             size = continuum.layout.n_unknowns
-            self._blocks = fast_product(self.stiffness(), size, continuum.comm)
-        return self._blocks(self.columns())
+            self._rows = StiffnessRows(self.stiffness(), every, size, continuum.comm)
+        return self._rows(self.columns())
 
     def _compile(self) -> None:
         if self._form is None:

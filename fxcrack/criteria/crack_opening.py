@@ -37,7 +37,8 @@ class CrackOpening(Criterion):
         critical: Critical opening [length]: a number; a table (lengths, values) against the
             cumulative crack length, linear between entries and not extrapolated: before the first
             and beyond the last length the value there holds; or a table against temperature.
-        distance: Straight-line distance behind the current tip [length].
+        distance: Straight-line distance behind the current tip [length]; three elements or more
+            (two at least, below which a warning is given).
         symmetry: The faces lie on a symmetry plane: half the critical opening is used. Needs a
             bond in the normal direction only.
         tolerance: f_tol; growth is accepted while 1 - f_tol <= f <= 1 + f_tol.
@@ -170,6 +171,8 @@ class OpeningEvaluator(Evaluator):
         tips = probe.front.tips()
         if len(tips):
             self._stencil(tips)  # a wrong distance shows here
+            owner, distance = type(criterion).__name__, criterion.distance
+            self.stencils.look_at_elements(tips, owner, distance, tips.d_behind)
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:
         paired = self.probe.pair.paired

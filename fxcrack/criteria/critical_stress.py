@@ -38,7 +38,8 @@ class CriticalStress(Criterion):
         sigma_f: Normal strength [stress], a number or a table against temperature.
         tau1_f: Shear strength in the growth direction [stress], likewise; None or 0: no effect.
         tau2_f: Shear strength along the front [stress], likewise; None or 0: no effect; 3-D only.
-        distance: Distance ahead of the tip along the slave surface [length].
+        distance: Distance ahead of the tip along the slave surface [length]; three elements or
+            more (two at least, below which a warning is given).
         tolerance: f_tol; growth is accepted while 1 - f_tol <= f <= 1 + f_tol.
     """
 
@@ -150,6 +151,8 @@ class StressEvaluator(Evaluator):
         tips = probe.front.tips()
         if len(tips):
             self.stencils.at(tips)  # a wrong distance shows here
+            owner, distance = type(criterion).__name__, criterion.distance
+            self.stencils.look_at_elements(tips, owner, distance, tips.d_ahead)
         self._starting = False
 
     def _part(self, tips: Tips, i: int) -> tuple[Ints, Array]:

@@ -5,7 +5,8 @@ has the further term
 
     - int t_a . (H q) dS
 
-On the faces of the crack itself it is zero, and ahead of the tip both sides cancel.
+On the faces of a straight crack it is zero, and ahead of the tip both sides cancel. The faces of a
+curved one leave the plane on which the fields of the tip are free of tractions, and count.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def outer_faces(
     cells: FrontCells,
     geometry: CellGeometry,
     q: Array,
-    own: Bools,
+    free: Bools,
     fields: TipFields,
     origin: Array,
     above: Bools,
@@ -40,7 +41,8 @@ def outer_faces(
         cells: The cells of the ring.
         geometry: Their geometry.
         q: Extension at their corners, shape (n_cells, n_corners, gdim).
-        own: Whether each facet of a cell is one of the interface, shape (n_cells, n_facets).
+        free: Whether each facet of a cell is a free face that the fields of the tip may load, shape
+            (n_cells, n_facets).
         fields: The crack-tip fields.
         origin: The tip, shape (3,) [length].
         above: Whether each cell is on the side the normal points to, shape (n_cells,).
@@ -56,7 +58,7 @@ def outer_faces(
     kind, table = closure_table(cells.cell_type, cells.order)
     corners = cells.facet_corners
     moves = np.abs(q).max(axis=2)[:, corners].max(axis=2) > 0.0
-    chosen = cells.outer & ~own & moves
+    chosen = free & moves
     if not chosen.any():
         return out
     points, weights = edge_quadrature(kind)

@@ -16,6 +16,7 @@ from fxcrack.continuum.face import Face
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.continuum.loads import BodyForce
 from fxcrack.criteria.cell_laws import CellLaws, law_of, tensor_of_stress, voigt_strain
+from fxcrack.criteria.cell_sides import cells_above, free_facets
 from fxcrack.criteria.crack_tip_fields import TipFields
 from fxcrack.criteria.face_tractions import FaceTractions, loads_on_faces, opened_facets
 from fxcrack.criteria.front_ends import on_planes_of_symmetry
@@ -67,6 +68,11 @@ class _Place:
     opened: Ints
     weights: Array | None
     step: float
+
+    @property
+    def normal(self) -> Array:
+        """Normal of the interface where the modes are found, shape (3,)."""
+        return self.tips.frame[self.modes, :, 0]
 
 
 class RingBuilder:
@@ -138,6 +144,7 @@ class RingBuilder:
         wide = float(np.hypot(self._rings * size.max(initial=0.0), 0.5 * reach))
         cells = self._cells.near(x[:, :gdim], np.full(len(x), wide))
         corners = Corners(cells, line)
+        sides = cells_above(cells, self._slaves, self._masters)
         weights = None
         if cells.kind == "tetrahedron":
             along = corners.allowed(surface.dofs[tips.node], line.directions(tips))
@@ -158,7 +165,7 @@ class RingBuilder:
                 row = None if weights is None else weights[i] * areas[i] / areas
                 beside = i if row is None else line.inward(i)
                 where = _Place(front, tips, i, line, beside, float(size[i]), opened, row, step)
-                ring = self._make(where, cells, corners)
+                ring = self._make(where, cells, corners, sides)
             known[key] = ring
             rings.append(ring)
         self._fresh = known
@@ -217,14 +224,16 @@ class RingBuilder:
             float(tips.width[i]),
         )  # fmt: skip
 
-    def _make(self, at: _Place, cells: FrontCells, corners: Corners) -> Ring:
+    def _make(
+        self, at: _Place, cells: FrontCells, corners: Corners, sides: tuple[Bools, Bools]
+    ) -> Ring:
         """The largest ring of a tip with one material on each side, of one layer at least."""
         i, size = at.i, at.size * (1.0 + 1e-6)
         normal = at.tips.frame[i, :, 0]
         origin = at.front.surface.x[at.tips.node[i]]
         centre = np.zeros((len(cells.nodes), 3))
         centre[:, : self._probe.gdim] = cells.corners.mean(axis=1)
-        above = (centre - origin) @ normal > 0.0
+        above = np.where(sides[1], sides[0], (centre - origin) @ normal > 0.0)
         hat = np.zeros(len(at.tips))
         hat[at.line.members[at.modes]] = 1.0
         alone = np.broadcast_to(at.tips.frame[at.modes, :, 1], (len(at.tips), 3))
@@ -309,7 +318,9 @@ class RingBuilder:
         if gdim == 2:
             area = float(continuum.model.breadth(origin[None])[0])
         if at.weights is None:
-            interaction = self._interaction(fields, origin, cells, q, above, laws, faces, of_cell)
+            interaction = self._interaction(
+                at, fields, origin, cells, q, above, laws, faces, of_cell
+            )
         else:
             some = np.flatnonzero(np.abs(q).max(axis=(1, 2)) > 0.0)
             few = cells.chosen(some)
@@ -317,7 +328,7 @@ class RingBuilder:
                 self._on_faces, q[some], few, above[some], nodes, n_loads, gdim=gdim
             )
             interaction = self._interaction(
-                fields, origin, few, q[some], above[some],
+                at, fields, origin, few, q[some], above[some],
                 CellLaws(self._laws, few.part, finite=self._bodies.finite), pulled, of_cell[some],
                 len(nodes),
             )  # fmt: skip
@@ -344,6 +355,7 @@ class RingBuilder:
 
     def _interaction(
         self,
+        at: _Place,
         fields: TipFields | None,
         origin: Array,
         cells: FrontCells,
@@ -389,8 +401,9 @@ class RingBuilder:
         by_node = np.zeros((m, n_nodes, gdim))
         each = geometry.weights_at_nodes(modes)
         each += outer_faces(
-            cells, geometry, q, self._own_facets(cells), fields, origin, above, stiffness, m,
-            thickness,
+            cells, geometry, q,
+            free_facets(cells, self._own_facets(cells), self._held(at.front), at.normal, origin),
+            fields, origin, above, stiffness, m, thickness,
         )  # fmt: skip
         for mode in range(m):
             np.add.at(by_node[mode], of_cell, each[mode])
@@ -400,6 +413,12 @@ class RingBuilder:
             for weights in (by_node, by_rise, by_load):
                 weights[np.arange(m) != _OPENING] = 0.0
         return Interaction(by_node, by_rise, by_load, energy, fields.oscillation)
+
+    def _held(self, front: Front) -> Ints:
+        """Global displacement nodes of both sides that are bonded, shape (n,)."""
+        masters = [self._probe.pair.masters[k] for k in np.flatnonzero(front.bonded)]
+        slaves = front.surface.dofs[front.bonded]
+        return np.concatenate([slaves, *masters]) if len(self._masters) else slaves
 
     def _own_facets(self, cells: FrontCells) -> Bools:
         """Whether each facet of a cell is one of the interface, shape (n_cells, n_facets)."""

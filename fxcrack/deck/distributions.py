@@ -7,7 +7,8 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, key, to_float
-from fxcrack.deck.flat import Flat, Placed
+from fxcrack.deck.flat import Flat
+from fxcrack.deck.numbering import Placed
 
 
 def find_distribution(owner: Card, name: str, placed: Placed, flat: Flat) -> Card:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,38 +10,15 @@ from fxcrack.base import log
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import did_you_mean
 from fxcrack.deck.cards import Card, DeckError, key
-from fxcrack.deck.element_checks import check_nodes, one_kind, repetitions
+from fxcrack.deck.element_checks import one_kind, repetitions
 from fxcrack.deck.elements import face_nodes, to_dolfinx
 from fxcrack.deck.model import Model
+from fxcrack.deck.numbering import number_spaces
 from fxcrack.deck.raising import raise_order
-from fxcrack.deck.spaces import HOME, NamedSet, Space, SurfaceDef, distinct, missing
+from fxcrack.deck.spaces import HOME, NamedSet, SurfaceDef, distinct, missing
 from fxcrack.mesh.raw import row_ids
 
 _PLANE = 1e-9
-
-
-@dataclass(frozen=True)
-class Placed:
-    """A space in the numbering of the whole model.
-
-    Attributes:
-        space: The part's instance, or what stands outside of instances.
-        first_node: Number of its first node.
-        cell_labels: Numbers of its elements, ascending.
-        cells: The cell of each of them.
-    """
-
-    space: Space
-    first_node: int
-    cell_labels: Ints
-    cells: Ints
-
-    def cell_of(self, labels: Ints) -> Ints:
-        """Cell of each element number, -1 where there is none."""
-        if not len(self.cell_labels):
-            return np.full(len(labels), -1, dtype=np.int64)
-        at = np.minimum(np.searchsorted(self.cell_labels, labels), len(self.cell_labels) - 1)
-        return np.where(self.cell_labels[at] == labels, self.cells[at], -1)
 
 
 class Flat:
@@ -76,41 +53,10 @@ class Flat:
                 "with an *INSTANCE of each part"
             )
         self.kind = one_kind(list(spaces.values()))
-        self.placed: dict[str, Placed] = {}
-        points, blocks, n_nodes, n_cells = [], [], 0, 0
-        for name, space in spaces.items():
-            labels, cells = [], []
-            for block in space.elements.values():
-                if not len(block.table.labels):
-                    continue
-                nodes = np.asarray(block.table.rows, dtype=np.int64)
-                at = space.nodes.find(nodes)
-                if np.any(at < 0):
-                    row, column = np.argwhere(at < 0)[0]
-                    block.card.fail(
-                        f"element {int(block.table.labels[row])} has node "
-                        f"{int(nodes[row, column])}, which is not defined"
-                    )
-                blocks.append(at + n_nodes)
-                labels.append(block.table.labels)
-                cells.append(n_cells + np.arange(len(nodes)))
-                check_nodes(block.card, block.table.labels, nodes)
-                n_cells += len(nodes)
-            all_labels = np.concatenate(labels) if labels else np.zeros(0, dtype=np.int64)
-            all_cells = np.concatenate(cells) if cells else np.zeros(0, dtype=np.int64)
-            by_label = np.argsort(all_labels, kind="stable")
-            twice = np.flatnonzero(np.diff(all_labels[by_label]) == 0)
-            if len(twice):
-                raise DeckError(
-                    f"element {int(all_labels[by_label][twice[0]])} is defined with two types; "
-                    "give every element a number of its own"
-                )
-            self.placed[name] = Placed(space, n_nodes, all_labels[by_label], all_cells[by_label])
-            points.append(space.places())
-            n_nodes += len(space.nodes.labels)
-        self.points = np.concatenate(points)
-        self.cells = np.concatenate(blocks)
-        self.n_given = n_nodes
+        numbering = number_spaces(spaces)
+        self.placed = numbering.placed
+        self.points, self.cells = numbering.points, numbering.cells
+        self.n_given = len(self.points)
         self.parents = np.zeros((0, 8), dtype=np.int64)
         self.weights = np.zeros((0, 8))
         self.given_kind = self.kind

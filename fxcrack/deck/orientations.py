@@ -14,7 +14,8 @@ import numpy as np
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.deck.cards import Card, Row, key, to_float
 from fxcrack.deck.distributions import distributed, find_distribution, same_values
-from fxcrack.deck.flat import Flat, Placed
+from fxcrack.deck.flat import Flat
+from fxcrack.deck.numbering import Placed
 
 _MOST = 64
 """Different axes of one section: each makes a material of its own, whose forms are compiled."""

@@ -16,10 +16,11 @@ from fxcrack.continuum.ply import Ply
 from fxcrack.continuum.section import Section
 from fxcrack.deck.cards import Card, DeckError, key
 from fxcrack.deck.distributions import distributed, find_distribution, same_values
-from fxcrack.deck.flat import Flat, Placed
+from fxcrack.deck.flat import Flat
 from fxcrack.deck.groups import Groups
 from fxcrack.deck.initial_stress import InitialStress, Stress
 from fxcrack.deck.materials import Frame, Materials
+from fxcrack.deck.numbering import Placed
 from fxcrack.deck.orientations import (
     Axes,
     find_orientation,

@@ -248,12 +248,6 @@ class Space:
         parts = [table.labels for table in self.rigid.values()]
         return distinct(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
 
-    @property
-    def element_labels(self) -> Ints:
-        """Numbers of all elements, ascending, shape (n,)."""
-        parts = [e.table.labels for e in self.elements.values()]
-        return distinct(np.concatenate(parts)) if parts else np.zeros(0, dtype=np.int64)
-
     def add_to_set(
         self, card: Card, kind: str, name: str, labels: Ints, *, space: str = HOME
     ) -> None:

@@ -63,11 +63,6 @@ class FrictionWork:
         return self.predicted - float(lost)
 
 
-def has_friction(pairs: list[Pair]) -> bool:
-    """Whether any interface has friction."""
-    return any(pair.friction is not None for pair in pairs)
-
-
 def nodes_of(pair: Pair, front: Front, index: Ints) -> Ints:
     """Slave nodes that may touch: open, paired, with a retained normal jump.
 
@@ -218,7 +213,6 @@ def release_to_contact(
 __all__ = [
     "FrictionWork",
     "contact_share",
-    "has_friction",
     "make_friction",
     "nodes_of",
     "release_to_contact",

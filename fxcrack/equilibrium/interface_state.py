@@ -21,11 +21,11 @@ from fxcrack.condensation.mumps_schur import HELD_BY_ROUND_OFF, mumps_message
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
 from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.coulomb import FrictionState, NodeStates
-from fxcrack.equilibrium.friction_state import has_friction, make_friction, nodes_of
+from fxcrack.equilibrium.friction_state import make_friction, nodes_of
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.equilibrium.jump_system import ComponentStates
 from fxcrack.interface.front import Front
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import Pair, with_friction
 
 Arrays = dict[str, npt.NDArray[Any]]
 
@@ -143,7 +143,7 @@ class InterfaceState:
         soft = np.concatenate([b.components for b in bonds]) if bonds else np.zeros(0, np.int64)
         system.closed[:] = self.values(self.states.closed, index, n)
         system.contact[:] = self.values(self.states.contact, index, n)
-        friction = has_friction(pairs)
+        friction = bool(with_friction(pairs))
         for pair, front, numbers in zip(pairs, fronts, index, strict=True):
             retained = numbers[:, 0] >= 0
             system.gap[numbers[retained, 0]] = pair.gap[retained]

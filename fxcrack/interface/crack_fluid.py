@@ -30,6 +30,7 @@ from fxcrack.base.arrays import Array, Bools
 from fxcrack.base.sparse import by_component
 from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.face import Face
+from fxcrack.continuum.follower_work import SIMPSON, FollowerWork
 from fxcrack.continuum.input_order import Place
 from fxcrack.continuum.kinematics import Axisymmetric
 from fxcrack.continuum.term import Term
@@ -37,8 +38,6 @@ from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.nodes import InterfaceNodes
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.surface import gather_surface, shape_functions
-
-_SIMPSON = ((0.0, 1.0 / 6.0), (0.5, 4.0 / 6.0), (1.0, 1.0 / 6.0))
 
 
 class _Sheet:
@@ -169,9 +168,9 @@ class CrackFluid(Term):
         self._rest = np.zeros((pair.surface.n_nodes, 3))
         self._rest = pair.surface.x - self._image(np.zeros_like(self._x))
         self._dead = self._all_forces(np.zeros_like(self._x))
-        self._last_u = np.zeros_like(fem.Function(continuum.space).x.array)
+        self._path = FollowerWork(continuum.space)
         self._now = np.zeros_like(self._x)  # displacement of the nodes in the present trial
-        self._factor = self._last_factor = self._work = 0.0
+        self._factor = 0.0
 
     # -- geometry ------------------------------------------------------------------------
 
@@ -218,7 +217,7 @@ class CrackFluid(Term):
         across = end - begin
         swept = sum(
             w * float(np.vdot(self._sheet.forces(begin + s * across), across[:, :gdim]))
-            for s, w in _SIMPSON
+            for s, w in SIMPSON
         )
         return swept - float(np.vdot(self._dead, self._now[:, :gdim]))
 
@@ -279,47 +278,36 @@ class CrackFluid(Term):
             matrix.setValues(row, columns[part], own.data[part], addv=PETSc.InsertMode.ADD_VALUES)
 
     def path_work(self, u: fem.Function) -> float:
-        """Work of the change on the straight path from the last state; exact, by Simpson's rule.
-
-        Pressure and displacement are linear on the path, the deformed area at most quadratic.
-        """
-        gdim, last = self._continuum.gdim, self._gather(self._last_u)
+        """Work of the change on the straight path from the last state, exact."""
+        gdim, last = self._continuum.gdim, self._gather(self._path.u)
         step = self._gather(u.x.array) - last
-        work = 0.0
-        for s, weight in _SIMPSON:
-            factor = (1.0 - s) * self._last_factor + s * self._factor
+
+        def power(s: float, factor: float) -> float:
             change = self._all_forces(last + s * step) - self._dead
-            work += weight * factor * float(np.vdot(change, step[:, :gdim]))
-        return work
+            return factor * float(np.vdot(change, step[:, :gdim]))
+
+        return self._path.along(self._factor, power)
 
     def commit(self, u: fem.Function) -> None:
         """Add the work along the straight path from the last state."""
-        self._work += self.path_work(u)
-        self._last_u[:] = u.x.array
-        self._last_factor = self._factor
+        self._path.accept(u, self._factor, self.path_work(u))
 
     def work(self) -> float:
         """Work of the change up to the last commit, force x length; the same on all ranks."""
-        return self._work
+        return self._path.work
 
     def state(self) -> dict[str, Array]:
-        """Displacement and load factor of the last commit, work so far.
-
-        Returns:
-            "last": displacement of the local dofs, ghosts too, shape (n_dofs,), length; "sums":
-            load factor and work (force x length), shape (2,).
-        """
-        return {"last": self._last_u.copy(), "sums": np.array([self._last_factor, self._work])}
+        """State of the work, shapes as in :meth:`FollowerWork.state`."""
+        return self._path.state()
 
     def places(self) -> dict[str, Place]:
-        """Space of the displacement."""
-        return {"last": self._continuum.space}
+        """Where that state is defined."""
+        return self._path.places()
 
     def restore(self, state: dict[str, Array]) -> None:
         """Set the committed state from :meth:`state`, arrays of the same shapes."""
-        self._last_u[:] = state["last"]
-        self._last_factor, self._work = (float(x) for x in state["sums"])
-        self._factor = self._last_factor
+        self._path.restore(state)
+        self._factor = self._path.factor
 
 
 def _cross(a: Array) -> Array:

@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from fxcrack.base.arrays import Array
 from fxcrack.base.checks import (
+    as_float,
     flag,
     is_count,
     is_function,
@@ -46,7 +47,8 @@ class Interface:
             ``Pair.surface``), or ``None``: all of them, and no tip exists.
         contact: Open faces cannot pass through each other (unilateral).
         friction: Coulomb's coefficient of the faces in contact, stick and slip alike: a number, or
-            a function of positions of shape (3, n) that returns n numbers. ``None``: no friction.
+            a function of positions of shape (3, n) that returns n numbers. ``None``, or 0
+            everywhere: no friction.
         normal_only: Bonds hold the opening only and let the faces slip.
         symmetry: The master is a plane of symmetry (:class:`fxcrack.RigidPlane`), and the scene
             models one half of the body. Bonds hold the opening only, as with ``normal_only``.
@@ -133,7 +135,7 @@ class Interface:
                     f"{where}: symmetry=True needs a plane of symmetry as its master, "
                     f"fxcrack.RigidPlane(point, normal), not {shown(self.master)}"
                 )
-            if self.friction is not None:
+            if self._rubs:
                 raise InterfaceError(
                     f"{where}: friction is not possible on a plane of symmetry, where both halves "
                     "slide alike; leave out friction, or leave out symmetry=True if the plane is a "
@@ -170,15 +172,6 @@ class Interface:
         if self.friction is None:
             return
         where = f"interface '{self.title}'"
-        if not self.contact:
-            raise InterfaceError(
-                f"{where}: friction needs contact; add contact=True or leave friction out"
-            )
-        if self.normal_only:
-            raise InterfaceError(
-                f"{where}: friction is not possible with bonds in the normal direction only; leave "
-                "out friction, or bond in all directions"
-            )
         if not is_function(self.friction):
             try:
                 mu = number(where, "friction", self.friction)
@@ -188,6 +181,20 @@ class Interface:
                     "such as 0.3, or a function of positions"
                 ) from error
             check_coefficients(np.array([mu]), where)
+        if self._rubs and not self.contact:
+            raise InterfaceError(
+                f"{where}: friction needs contact; add contact=True or leave friction out"
+            )
+        if self._rubs and self.normal_only:
+            raise InterfaceError(
+                f"{where}: friction is not possible with bonds in the normal direction only; leave "
+                "out friction, or bond in all directions"
+            )
+
+    @property
+    def _rubs(self) -> bool:
+        """Whether faces may have friction: a coefficient of 0 is none."""
+        return self.friction is not None and as_float(self.friction) != 0.0
 
     @property
     def is_rigid(self) -> bool:

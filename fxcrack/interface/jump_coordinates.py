@@ -173,7 +173,7 @@ def build_coordinates(
         InterfaceError: A slave used twice, a cycle of slaves and masters, a support on a slave
             node that its masters do not share.
     """
-    gdim, comm = layout.gdim, layout.comm
+    gdim = layout.gdim
     # a node whose jump is free and of no interest keeps its own displacement
     jumped = [p.paired & (r != FREE).any(axis=1) for p, r in zip(pairs, roles, strict=True)]
     for pair, has_jump in zip(pairs, jumped, strict=True):
@@ -230,23 +230,10 @@ def build_coordinates(
     follows_here = follows[nodes.mine]
     own[local[follows_here]] = free_jump[nodes.mine][follows_here]
 
-    index, n_retained = [], 0
-    for role in roles:
-        number = np.full(role.shape, -1, dtype=np.int64)
-        inside = role == RETAINED
-        number[inside] = n_retained + np.arange(int(inside.sum()))
-        n_retained += int(inside.sum())
-        index.append(number)
+    index, n_retained = _number_retained(roles)
     n_supports = len(supports.columns)
-    n_inner = int(own.sum())
-    counts = np.zeros(comm.size, dtype=np.int64)
-    comm.Allgather(np.array([n_inner], dtype=np.int64), counts)
-    extra = n_retained + n_supports + n_borders
-    first = int(counts[0])
-    start = int(counts[: comm.rank].sum()) + (extra if comm.rank > 0 else 0)
-    n_columns = int(counts.sum()) + extra
-    column = np.full(layout.n_local, -1, dtype=np.int64)
-    column[own] = start + np.arange(n_inner)
+    column, first, size = _number_columns(layout, own, n_retained + n_supports + n_borders)
+    n_inner, n_columns = int(own.sum()), size[1]
     at_shared = shared.spread(column, first + n_retained)
 
     composed: tuple[Ints, sp.csr_matrix] | None = None
@@ -275,7 +262,6 @@ def build_coordinates(
         )
     single = (supports.which >= 0) | (column >= 0)
     single[followers] = False
-    size = n_inner + (extra if comm.rank == 0 else 0), n_columns
     given = layout, supports, column, followers, of_followers, first + n_retained, size
     transform = _assemble(single, *given)
     sparse = transform
@@ -286,6 +272,52 @@ def build_coordinates(
         n_inner, first, np.flatnonzero(own),
         _springs(layout, nodes, links, frames, springs, elastic, column),
     )  # fmt: skip
+
+
+def _number_retained(roles: Sequence[npt.NDArray[np.int8]]) -> tuple[list[Ints], int]:
+    """Numbers of the retained jumps and how many there are.
+
+    Args:
+        roles: FIXED, FREE or RETAINED per pair and jump component, shape (n_nodes, gdim).
+
+    Returns:
+        Per pair the number of each component, -1 where it is not retained, shape (n_nodes, gdim);
+        their sum.
+    """
+    index, n_retained = [], 0
+    for role in roles:
+        number = np.full(role.shape, -1, dtype=np.int64)
+        inside = role == RETAINED
+        number[inside] = n_retained + np.arange(int(inside.sum()))
+        n_retained += int(inside.sum())
+        index.append(number)
+    return index, n_retained
+
+
+def _number_columns(
+    layout: DofLayout, own: Bools, n_last: int
+) -> tuple[Ints, int, tuple[int, int]]:
+    """Number the columns of T: those of dofs rank by rank, the last ones behind those of rank 0.
+
+    Collective.
+
+    Args:
+        layout: Unknowns of nodes and their numbers.
+        own: Whether each owned dof has a column of its own, shape (n_local,).
+        n_last: Columns of no dof.
+
+    Returns:
+        Column of each owned dof, -1 where it has none, shape (n_local,); the first one of no dof;
+        columns on this rank and in all.
+    """
+    comm, n_inner = layout.comm, int(own.sum())
+    counts = np.zeros(comm.size, dtype=np.int64)
+    comm.Allgather(np.array([n_inner], dtype=np.int64), counts)
+    start = int(counts[: comm.rank].sum()) + (n_last if comm.rank > 0 else 0)
+    column = np.full(layout.n_local, -1, dtype=np.int64)
+    column[own] = start + np.arange(n_inner)
+    here = n_inner + (n_last if comm.rank == 0 else 0)
+    return column, int(counts[0]), (here, int(counts.sum()) + n_last)
 
 
 def _springs(

@@ -5,6 +5,7 @@ u_s = sum_m W_sm u_m + R_s delta_s,    delta = (opening, slip, tear)
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -36,6 +37,11 @@ def has_slid(change: Array, pressed: Bools | None) -> Bools:
     """
     least = _SLID if pressed is None else np.where(pressed, _PRESSED, _SLID)
     return np.asarray(change > least)
+
+
+def with_friction(pairs: Sequence[Pair]) -> list[Pair]:
+    """The interfaces whose faces have friction."""
+    return [pair for pair in pairs if pair.friction is not None]
 
 
 @dataclass(frozen=True)

@@ -47,18 +47,21 @@ _BORDER = 1e-6
 def friction_of(interface: Interface, surface: FacetSurface) -> Array | None:
     """Coefficients of friction at the slave nodes, shape (n_nodes,); ``None`` without friction.
 
+    Faces whose coefficient is 0 everywhere have none.
+
     Raises:
         InterfaceError: A function returns other than one finite number >= 0 per node.
     """
     chosen, n = interface.friction, surface.n_nodes
     if chosen is None:
         return None
-    if not callable(chosen):
-        return np.full(n, float(chosen))
-    where = f"interface '{interface.title}'"
-    mu = numbers_at(where, "friction", chosen, surface.x, error=InterfaceError)
-    check_coefficients(mu, where)
-    return mu
+    if callable(chosen):
+        where = f"interface '{interface.title}'"
+        mu = numbers_at(where, "friction", chosen, surface.x, error=InterfaceError)
+        check_coefficients(mu, where)
+    else:
+        mu = np.full(n, float(chosen))
+    return mu if mu.any() else None
 
 
 def bonded_nodes(interface: Interface, surface: FacetSurface, continuum: Continuum) -> Bools:

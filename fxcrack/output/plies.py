@@ -93,7 +93,10 @@ class PlyResults:
         """Write one line for each place of each ply; not collective, call it on one rank."""
         head = ["cell", "ply", "angle", "place", "x", "y", "z"]
         head += [f"e{k}" for k in LABELS] + [f"s{k}" for k in LABELS]
-        with replacing(Path(path)) as partial, open(partial, "w", newline="") as file:
+        with (
+            replacing(Path(path)) as partial,
+            open(partial, "w", newline="", encoding="utf-8") as file,
+        ):
             out = csv.writer(file)
             out.writerow(head)
             for i in range(len(self.cell)):

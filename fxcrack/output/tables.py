@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from fxcrack.base.arrays import Array, Ints
-from fxcrack.base.checks import file_path, is_function, shown, text
+from fxcrack.base.checks import counted, file_path, is_function, shown, text
 from fxcrack.base.errors import InputError, unknown_name
 from fxcrack.base.files import replacing
 from fxcrack.base.parallel import all_or_none
@@ -71,7 +71,7 @@ def bond_table(source: Analysis | HasAnalysis) -> str:
     lines = []
     for crack in analysis.cracks:
         rows = bond_rows(analysis, crack, failed(crack), analysis.time)
-        lines.append(f"interface '{crack.title}': {len(rows)} bonds released")
+        lines.append(f"interface '{crack.title}': {counted(len(rows), 'bond')} released")
         if rows:
             names = [name for name in rows[0] if name != "interface"]
             lines.append("  " + "  ".join(f"{name:>11}" for name in names))
@@ -150,7 +150,10 @@ def write_rows(analysis: Analysis, path: str | Path, rows: list[Row]) -> None:
     path = file_path("the table", "path", path)
     with all_or_none(comm, f"writing {path}"):
         if comm.rank == 0:
-            with replacing(path) as temporary, temporary.open("w", newline="") as stream:
+            with (
+                replacing(path) as temporary,
+                temporary.open("w", newline="", encoding="utf-8") as stream,
+            ):
                 writer = csv.DictWriter(stream, list(rows[0]) if rows else ["interface", "node"])
                 writer.writeheader()
                 writer.writerows(rows)
@@ -168,7 +171,7 @@ def tip_table(source: Analysis | HasAnalysis) -> str:
         slave, master = analysis.pairs[g.p].sides
         lines.append(
             f"crack {number}: slave '{slave}', master '{master}', "
-            f"{type(g.criterion).__name__}, {g.n_released} nodes released, "
+            f"{type(g.criterion).__name__}, {counted(g.n_released, 'node')} released, "
             f"open area {g.extent.area(g.tips()):.6g}"
         )
         values = g.evaluate(g.tips(), analysis.solver.state, analysis.time)
@@ -194,4 +197,4 @@ def write_tip_table(source: Analysis | HasAnalysis, path: str | Path) -> None:
     with all_or_none(comm, f"writing {path}"):
         if comm.rank == 0:
             with replacing(path) as temporary:
-                temporary.write_text(text)
+                temporary.write_text(text, encoding="utf-8")

@@ -114,7 +114,7 @@ def write_grid(path: Path, grid: Grid) -> None:
         "</UnstructuredGrid>",
     ]
     # from version 2.1 on, VTK numbers the nodes of second-order hexahedra as DOLFINx does
-    path.write_text(_file("UnstructuredGrid", lines, "2.2"))
+    path.write_text(_file("UnstructuredGrid", lines, "2.2"), encoding="utf-8")
 
 
 def write_header(path: Path, grid: Grid, pieces: Sequence[str]) -> None:
@@ -131,7 +131,7 @@ def write_header(path: Path, grid: Grid, pieces: Sequence[str]) -> None:
         *(f"<Piece Source={_quoted(piece)}/>" for piece in pieces),
         "</PUnstructuredGrid>",
     ]
-    path.write_text(_file("PUnstructuredGrid", lines))
+    path.write_text(_file("PUnstructuredGrid", lines), encoding="utf-8")
 
 
 def write_series(path: Path, steps: Iterable[tuple[float, str]]) -> None:
@@ -139,4 +139,5 @@ def write_series(path: Path, steps: Iterable[tuple[float, str]]) -> None:
     lines = [
         f'<DataSet timestep="{time!r}" part="0" file={_quoted(name)}/>' for time, name in steps
     ]
-    path.write_text(_file("Collection", ["<Collection>", *lines, "</Collection>"]))
+    text = _file("Collection", ["<Collection>", *lines, "</Collection>"])
+    path.write_text(text, encoding="utf-8")

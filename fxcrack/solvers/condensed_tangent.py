@@ -13,9 +13,8 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.condensation.free_bodies import FreeBodies
 from fxcrack.condensation.iterative import Roles
 from fxcrack.equilibrium.contact import ContactSystem
-from fxcrack.equilibrium.friction_state import has_friction
 from fxcrack.interface.jump_coordinates import JumpCoordinates, build_coordinates
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import Pair, with_friction
 from fxcrack.interface.supports import Supports
 from fxcrack.solvers.interface_solver import Condensed
 from fxcrack.solvers.newton_state import ResumedTangent
@@ -86,7 +85,7 @@ def condense_tangent(
         offset=np.zeros(coordinates.n_last),
     )  # fmt: skip
     system.cholesky.restraint = tangent.restraint
-    system.soft_contact = bodies.dynamic and not has_friction(request.pairs)
+    system.soft_contact = bodies.dynamic and not with_friction(request.pairs)
     residual = tangent.out_of_balance(loads)
     tangent.anchor(system, residual, jumps(u, coordinates), loads).destroy()
     residual.destroy()

@@ -5,8 +5,8 @@ all others only the velocity changes,
 
     v^{n+1/2} = v^{n-1/2} - (h/m) f_int(u^n)
 
-which with a stiffness is one product that adds to the velocity in place: its rows are scaled with
-h/m beforehand, and those of the chosen dofs are taken out.
+which with a stiffness is one product with the rows of these dofs
+(:mod:`fxcrack.continuum.stiffness_rows`).
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.sparse import Product
 from fxcrack.continuum.block_product import BlockProduct, fast_product
 from fxcrack.continuum.internal_forces import InternalForces
+from fxcrack.continuum.stiffness_rows import StiffnessRows
 
 
 class BodyMotion:
@@ -45,8 +46,9 @@ class BodyMotion:
         self._h = 0.0
         self._per_mass = np.ones(n)
         self._scale, self._changes = np.zeros(n), np.zeros(n)
-        self._rows: Product | None = None
-        self._change: BlockProduct | Product | None = None
+        self._rows: list[tuple[BlockProduct | Product, slice]] = []
+        self._rest: StiffnessRows | None = None
+        self._first_h = 1.0
 
     def prepare(self, inverse_mass: Array) -> None:
         """Take the operator that was chosen, and masses.
@@ -55,19 +57,21 @@ class BodyMotion:
             inverse_mass: One over the mass of the owned dofs, shape (n_local,).
         """
         self._per_mass, self._h = inverse_mass, 0.0
-        self._rows = self._change = self._first = None
+        self._rows, self._rest, self._first = [], None, None
         if self._bodies.choice.name == "product":
             stiffness = self._bodies.stiffness()
             self._bodies.forget_stiffness()
-            self._rows = Product(stiffness[self._chosen])
+            continuum, chosen = self._bodies.continuum, self._chosen
+            size = continuum.layout.n_unknowns
+            n = _whole_nodes(chosen, size)
+            by_nodes = fast_product(stiffness[chosen[:n]], size, continuum.comm)
+            self._rows = [(by_nodes, slice(0, n))]
+            if n < len(chosen):
+                self._rows.append((Product(stiffness[chosen[n:]]), slice(n, None)))
             scaled = sp.diags(-inverse_mass[self._early])
             self._first = Product(sp.csr_matrix(scaled @ stiffness[self._early]))
-            keep = sp.diags(np.where(self._later, -inverse_mass, 0.0))
-            change = sp.csr_matrix(keep @ stiffness)
-            change.eliminate_zeros()
-            continuum = self._bodies.continuum
-            self._change = fast_product(change, continuum.layout.n_unknowns, continuum.comm)
-            self._h = 1.0
+            self._first_h = 1.0
+            self._rest = StiffnessRows(stiffness, self._later, size, continuum.comm)
 
     def forces(self, out: Array, h: float) -> None:
         """Internal forces at the chosen dofs; collective.
@@ -77,14 +81,15 @@ class BodyMotion:
             h: Time from the last velocity to the next, for :meth:`change_others`.
         """
         self._bodies.evaluations += 1
-        if self._change is not None and self._rows is not None:
+        if self._rest is not None:
             if h != self._h:
-                self._change.data *= h / self._h
+                self._scale, self._h = np.where(self._later, -h * self._per_mass, 0.0), h
                 if self._first is not None:
-                    self._first.data *= h / self._h
-                self._h = h
+                    self._first.data *= h / self._first_h
+                    self._first_h = h
             self._u = self._bodies.columns()
-            self._rows.into(self._u, out)
+            for product, part in self._rows:
+                product.into(self._u, out[part])
             return
         forces = self._bodies.forces()
         np.take(forces, self._chosen, out=out)
@@ -110,23 +115,37 @@ class BodyMotion:
         Args:
             velocity: Of the owned dofs, shape (n_local,), length/time.
         """
-        if self._change is not None:
-            self._change.add(self._u, velocity)
+        if self._rest is not None:
+            self._rest.push(self._u, self._scale, velocity)
 
     def whole(self) -> Array:
         """Internal forces at the owned dofs at the present displacement, shape (n_local,), force.
 
         Collective.
         """
-        if self._change is None or self._rows is None:
+        if self._rest is None:
             return self._bodies.forces().copy()
         u = self._bodies.columns()  # rows may need more nodes than the displacement has
-        out = self._change(u)
-        if self._first is not None:
-            out[self._early] = self._first(u)
-        out *= -1.0 / (self._h * self._per_mass)
-        out[self._chosen] = self._rows(u)
+        out = self._rest(u)
+        if self._first is not None and len(self._early):
+            out[self._early] = self._first(u) / (-self._first_h * self._per_mass[self._early])
+        found = np.empty(len(self._chosen))
+        for product, part in self._rows:
+            product.into(u, found[part])
+        out[self._chosen] = found
         return out
+
+
+def _whole_nodes(dofs: Ints, size: int) -> int:
+    """How many dofs at the beginning are all those of a node, one node after the other.
+
+    Args:
+        dofs: Shape (n,).
+        size: Unknowns of a node.
+    """
+    nodes = dofs[: len(dofs) // size * size].reshape(-1, size)
+    whole = (nodes[:, 0] % size == 0) & np.all(np.diff(nodes, axis=1) == 1, axis=1)
+    return size * (len(whole) if whole.all() else int(np.argmin(whole)))
 
 
 __all__ = ["BodyMotion"]

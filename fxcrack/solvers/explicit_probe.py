@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, Protocol
 
 import numpy as np
-from mpi4py import MPI
 
 from fxcrack.base.arrays import Array, Ints
 from fxcrack.base.errors import InputError
@@ -133,11 +132,7 @@ class ExplicitFrontProbe:
         Raises:
             InputError: The mesh has no such group, or it holds no node.
         """
-        continuum = self._values.continuum
-        nodes = continuum.owned_nodes(group)
-        total = np.append(continuum.positions()[nodes].sum(axis=0), len(nodes))
-        total = continuum.comm.allreduce(total, op=MPI.SUM)
-        return np.asarray(total[:3] / total[3])
+        return self._values.continuum.mean_position(group)
 
     def follow(self, where: str | int) -> int:
         """Follow the mean displacement of a group or of a slave node; its row in :meth:`motion`."""

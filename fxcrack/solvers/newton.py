@@ -22,21 +22,15 @@ from fxcrack.equilibrium.interface_state import Arrays, InterfaceState
 from fxcrack.interface.crack_fluid import CrackFluid
 from fxcrack.interface.pair import Pair
 from fxcrack.interface.supports import Supports
+from fxcrack.solvers.accepted_bodies import AcceptedBodies
 from fxcrack.solvers.condensed_tangent import CondensedRequest, condense_tangent
 from fxcrack.solvers.deformed_interfaces import DeformedInterfaces
 from fxcrack.solvers.free_motion import moves_freely
-from fxcrack.solvers.increment_balance import ANOTHER, StoredEnergy
+from fxcrack.solvers.increment_balance import ANOTHER
 from fxcrack.solvers.increment_work import in_pieces
 from fxcrack.solvers.interface_solver import Condensed, InterfaceSolver
-from fxcrack.solvers.new_pairings import PairingEnergy, pressed, pulling
-from fxcrack.solvers.newton_state import (
-    NewtonState,
-    ResumedTangent,
-    Sums,
-    body_arrays,
-    restore_bodies,
-    tangent_arrays,
-)
+from fxcrack.solvers.new_pairings import pressed, pulling
+from fxcrack.solvers.newton_state import NewtonState, ResumedTangent, tangent_arrays
 from fxcrack.solvers.options import NewtonOptions
 from fxcrack.solvers.tangent import CondensedTangent
 from fxcrack.solvers.trial import IncrementSolver
@@ -67,14 +61,8 @@ class NewtonSolver(InterfaceSolver):
     Attributes:
         tangent: The bodies' condensed tangent.
         interfaces: The interfaces as the displacement has them.
-        u: Accepted displacement, owned dofs.
-        at: Time of the accepted state.
+        accepted: The bodies in the accepted state.
         counts: Solves and iterations so far.
-        largest_force: Largest norm of the internal forces of an accepted state, force.
-        energy_noise: Work that the round-off of the bodies' forces may have done in an accepted
-            state at most, force times length.
-        energy: What is stored in the accepted state.
-        pairing: Energy that new pairings of faces that slide have taken.
         exact: Whether S itself counts, not only equilibria found with it, as for rates by exact
             crack closure: it is that of every state then.
         free_start: Whether the motion began without an equilibrium, see :meth:`begin_motion`.
@@ -107,17 +95,17 @@ class NewtonSolver(InterfaceSolver):
         self._increments = IncrementSolver(self.tangent, newton, self.n_loads, len(loads))
         self.counts = self._increments.counts
         self.interfaces = DeformedInterfaces(continuum, pairs, self.fronts, finite=bodies.finite)
-        size = continuum.n_local, continuum.n_global
-        self.u = PETSc.Vec().createMPI(size, comm=continuum.comm)
-        self.at = 0.0
-        self.largest_force = self.energy_noise = 0.0
-        self.energy = StoredEnergy(bodies)
-        self.pairing = PairingEnergy()
+        self.accepted = AcceptedBodies(bodies, self.tangent)
         self.exact = self.free_start = False
         self._before = self.interface_state()  # of the accepted state, before the last trial
         self._begun = False  # whether the last trial was an increment of time for the terms
         self._account = TrialAccount()
         self._resumed_tangent: ResumedTangent | None = None
+
+    @property
+    def u(self) -> PETSc.Vec:
+        """Accepted displacement, owned dofs."""
+        return self.accepted.u
 
     # -- condensation --------------------------------------------------------------------
 
@@ -129,7 +117,7 @@ class NewtonSolver(InterfaceSolver):
             restraint=self.restraint,
             jumps=self.interfaces.jumps,
             resumed=self._resumed_tangent,
-            at=self.at,
+            at=self.accepted.at,
         )
 
     def _equilibrium(self, before: InterfaceState, force: Array) -> Equilibrium:
@@ -201,7 +189,7 @@ class NewtonSolver(InterfaceSolver):
         if self.bodies.dynamic:
             force = self.state.force  # no motion over a zero time step
         soft = bool(self.system.soft.bonds)  # they may run through unstable states on the way
-        self.move(self.state.loads, force, self.at, 0.0, follow=soft, confirm=False)
+        self.move(self.state.loads, force, self.accepted.at, 0.0, follow=soft, confirm=False)
         # overlapping faces and new pairings have energies of their own
         self.confirm(strict=None)
         self.commit()
@@ -235,7 +223,7 @@ class NewtonSolver(InterfaceSolver):
             ConvergenceError: None was found; the accepted state is in force again.
         """
         if self.bodies.accountable:
-            self.energy.now()
+            self.accepted.energy.now()
         self._before = self.interface_state()
         dynamic = self.bodies.dynamic
         self._begun = dt > 0.0 or not dynamic
@@ -244,7 +232,8 @@ class NewtonSolver(InterfaceSolver):
         try:
             trial = self._increments.find(
                 self.system, self.state, self.u, loads, force, at,
-                follow=follow and not dynamic, largest_force=self.largest_force,
+                follow=follow and not dynamic,
+                largest_force=self.accepted.largest_force,
                 moving=dynamic and self._begun,
             )  # fmt: skip
         except NO_EQUILIBRIUM:
@@ -279,7 +268,7 @@ class NewtonSolver(InterfaceSolver):
         if strict is not None and trial.iterations and self.bodies.accountable:
             overlap = self._overlap_work(trial.points[0][1], trial.end)
             part = self.newton.balance if strict else ANOTHER
-            off = self.energy.imbalance(trial, len(self.loads), overlap, part)
+            off = self.accepted.energy.imbalance(trial, len(self.loads), overlap, part)
             if off:
                 self.revert()
                 raise EnergyImbalance(off)
@@ -288,23 +277,9 @@ class NewtonSolver(InterfaceSolver):
         """The last trial becomes the accepted state; collective."""
         trial = self._account.at_hand
         assert trial.work is not None
-        step = self.u.copy()
-        step.aypx(-1.0, trial.u)
-        trial.u.copy(self.u)
-        self.at = trial.at
-        self.largest_force = max(self.largest_force, self.tangent.force_scale)
-        noise = self.tangent.round_off * float(self.u.norm())
-        self.energy_noise = max(self.energy_noise, noise)
-        self.tangent.drift = trial.drift
-        self.tangent.accept()
-        self.energy.accept(trial.energies)
+        self.accepted.take(trial, len(self.loads))
         self.state = trial.end
         self._account.accept()
-        self.pairing.book(
-            self.bodies, self.u, step, trial.work, len(self.loads),
-            lambda: self.nodal_forces(self.u),
-        )  # fmt: skip
-        step.destroy()
         inertia = self.bodies.inertia
         if self._begun:
             self.bodies.commit()
@@ -350,7 +325,7 @@ class NewtonSolver(InterfaceSolver):
     def _begin_again(self) -> None:
         """Take pressures and temperature of the accepted state."""
         if self._begun and not self.bodies.dynamic:
-            self.bodies.begin(self.at, 0.0)
+            self.bodies.begin(self.accepted.at, 0.0)
 
     # -- releases and new pairings -------------------------------------------------------
 
@@ -379,7 +354,7 @@ class NewtonSolver(InterfaceSolver):
             nonlocal energy, work
             target = force if to == 1.0 else begin + to * (force - begin)
             here = self.state
-            end = self.move(here.loads, target, self.at, 0.0, strict=strict)
+            end = self.move(here.loads, target, self.accepted.at, 0.0, strict=strict)
             more, out, _ = self.along(here, end)
             work, energy = work + more, energy + out
             self.book_contact(here, end)
@@ -399,7 +374,7 @@ class NewtonSolver(InterfaceSolver):
         Returns:
             What :meth:`along` does for the way there; ``None`` with inertia.
         """
-        self.pairing.begin(self.nodal_forces(self.u))
+        self.accepted.pairing.begin(self.nodal_forces(self.u))
         if self.bodies.dynamic:
             return None
         here = self.state
@@ -411,14 +386,7 @@ class NewtonSolver(InterfaceSolver):
 
     def remember(self) -> NewtonState:
         """What :meth:`recall` needs: interfaces, pairing, displacement, state of the terms."""
-        return NewtonState(
-            self.interface_state(),
-            list(self.pairs),
-            self.u.array.copy(),
-            [term.state() for term in self.bodies.terms],
-            self.at,
-            self.pairing.energy,
-        )
+        return self.accepted.remember(self.interface_state(), self.pairs)
 
     def recall(self, saved: NewtonState, *, retained: bool = True) -> None:
         """Return to an earlier accepted state; collective.
@@ -428,12 +396,7 @@ class NewtonSolver(InterfaceSolver):
             retained: Whether the retained jumps are still those of then.
         """
         self._account.give_up()
-        self.energy.forget()
-        here = min(self.continuum.comm.allgather(np.array_equal(self.u.array_r, saved.u)))
-        self.u.array[:] = saved.u
-        self.at = saved.at
-        for term, kept in zip(self.bodies.terms, saved.terms, strict=True):
-            term.restore(kept)
+        here = self.accepted.recall(saved)
         same = retained and all(a is b for a, b in zip(saved.pairs, self.pairs, strict=True))
         if not (same and here):
             self.tangent.accept()  # that of a state which is rejected as well
@@ -446,8 +409,6 @@ class NewtonSolver(InterfaceSolver):
             saved.interfaces.restore_bonds(self.fronts)
             self._retain(saved.interfaces)
         self._return()
-        self.pairing.forget()
-        self.pairing.energy = saved.pairing_energy
 
     def undo(self, saved: NewtonState, rebases: int) -> None:
         """See :meth:`fxcrack.solvers.base.Solver.undo`."""
@@ -463,12 +424,7 @@ class NewtonSolver(InterfaceSolver):
             :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (5,); and the
             tangent, see :func:`~fxcrack.solvers.newton_state.tangent_arrays`.
         """
-        energy = self.energy
-        sums = Sums(
-            self.pairing.energy, self.largest_force, energy.largest, self.tangent.drift,
-            energy.most, self.energy_noise,
-        )  # fmt: skip
-        out = super().collect() | body_arrays(self.bodies, self.interfaces, sums)
+        out = super().collect() | self.accepted.arrays(self.interfaces)
         return out | tangent_arrays(self.tangent, self.system, self.face_loads)
 
     def resume(self, arrays: Arrays, time: float) -> None:
@@ -484,16 +440,11 @@ class NewtonSolver(InterfaceSolver):
         Raises:
             InputError: The mesh has its cells in another order than when the state was saved.
         """
-        sums = restore_bodies(arrays, self.bodies, self.interfaces, time)
-        self.u.array[:] = self.bodies.u.x.array[: self.continuum.n_local]
+        drift = self.accepted.resume(arrays, self.interfaces, time)
         self.interfaces.move_fronts(self.u)
-        self.at = time
-        self.pairing.energy, self.largest_force = sums.pairing_energy, sums.largest_force
-        self.energy.largest, self.energy.most = sums.largest_energy, sums.most_energy
-        self.energy_noise = sums.energy_noise
         super().resume(arrays, time)
         assert self._resumed is not None
-        self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, sums.drift)
+        self._resumed_tangent = ResumedTangent.from_arrays(arrays, self._resumed.index, drift)
 
     # -- energies and fields -------------------------------------------------------------
 
@@ -513,7 +464,7 @@ class NewtonSolver(InterfaceSolver):
     def book_contact(self, here: Equilibrium, point: Equilibrium) -> None:
         """Add to their energies what friction and faces that overlap did in the last trial."""
         self.friction_energy += self._account.work_of(here, point).friction
-        if not self.pairing.pending:
+        if not self.accepted.pairing.pending:
             self.overlap_energy += self._overlap_work(here, point)
 
     def _overlap_work(self, here: Equilibrium, point: Equilibrium) -> float:
@@ -524,13 +475,13 @@ class NewtonSolver(InterfaceSolver):
 
     def stored(self, state: Equilibrium) -> dict[str, float]:
         """Energies stored in the bodies in the accepted state, by name; collective."""
-        return self.energy.now()
+        return self.accepted.energy.now()
 
     def spent(self) -> dict[str, float]:
         """Energies the bodies have turned into something else, by name; collective."""
         spent = self.bodies.spent()
         if self.interfaces.follow_sliding:
-            spent["pairing_energy"] = self.pairing.energy
+            spent["pairing_energy"] = self.accepted.pairing.energy
         return spent
 
     def extra_work(self, state: Equilibrium) -> float:
@@ -568,7 +519,7 @@ class NewtonSolver(InterfaceSolver):
     def destroy(self) -> None:
         """Free all PETSc objects; collective."""
         self._account.give_up()
-        self.pairing.forget()
+        self.accepted.pairing.forget()
         self._increments.destroy()
         self.tangent.destroy()
 

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 
 from fxcrack.base import log
-from fxcrack.base.arrays import Array, Ints
+from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.checks import format_point, missing_members, shown
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import Criterion, ReleaseLaw
@@ -145,14 +145,17 @@ class Crack:
             report = {**_named_apart(found, report, criterion), **report}
         return TipValues(tips, f, report, measured, state)
 
+    def bears(self, tips: Tips, state: Equilibrium) -> Bools:
+        """Whether the bonds of tips bear more than round-off in a state, shape (n_tips,)."""
+        force = np.abs(self.probe.bond_forces(tips.force_nodes, state)).max(axis=-1)
+        return np.asarray((force > self.probe.round_off(tips.force_nodes, state)).any(axis=1))
+
     def look_for_overlap(self, tips: Tips, state: Equilibrium) -> None:
         """Warn once where faces without contact pass through each other behind a tip."""
         if not self._may_overlap or not len(tips):
             return
         behind = openings(self.probe, tips, state)
-        force = np.abs(self.probe.bond_forces(tips.force_nodes, state)).max(axis=-1)
-        noise = self.probe.round_off(tips.force_nodes, state)
-        behind = np.where((force > noise).any(axis=1)[:, None, None], behind, 0.0)
+        behind = np.where(self.bears(tips, state)[:, None, None], behind, 0.0)
         size = float(np.abs(behind).max())
         if size < max(1e-12 * self.front.surface.facet_size, 1e-9 * np.abs(state.jump).max()):
             return  # round-off
@@ -223,7 +226,7 @@ class Crack:
             nodes: Slave nodes that are released now, shape (n,).
             values: Values of the criterion at the front they are part of.
         """
-        return _joined(self._softening.to_soften(nodes, values, self.law), values)
+        return joined_units(self._softening.to_soften(nodes, values, self.law), values)
 
     @property
     def _softening(self) -> SofteningEvaluator:
@@ -236,11 +239,13 @@ class Crack:
         self.records += release_records(self, nodes, values, state, time)
 
 
-def _joined(units: list[CohesiveUnit], values: TipValues) -> list[CohesiveUnit]:
+def joined_units(units: list[CohesiveUnit], values: TipValues) -> list[CohesiveUnit]:
     """Units that are equally critical, as mirror images or along a front in plane strain, as one.
 
     Each by a law of its own, one of them would open before the others wherever bonds run through
-    unstable states, and round-off would decide which.
+    unstable states, and round-off would decide which. That holds however far they are from each
+    other: the two tips of a crack in the middle of a body are mirror images. Units whose faces are
+    pressed together share a law with each other only.
 
     Args:
         units: Units that are released now.
@@ -249,16 +254,18 @@ def _joined(units: list[CohesiveUnit], values: TipValues) -> list[CohesiveUnit]:
     f_of = dict(zip(values.tips.node.tolist(), values.f.tolist(), strict=True))
     f = [max((f_of[n] for n in unit.nodes.tolist() if n in f_of), default=0.0) for unit in units]
     out: list[CohesiveUnit] = []
-    level = np.inf
+    level, place = np.inf, dict[bool, int]()  # f of the present group, and where its units are
     for i in np.argsort(-np.array(f), kind="stable"):
         unit = units[i]
-        if out and f[i] >= level * (1.0 - _TIE) and unit.pressed == out[-1].pressed:
-            last = out.pop()
-            nodes = np.union1d(last.nodes, unit.nodes)
-            energy, area = last.energy + unit.energy, last.area + unit.area
-            out.append(CohesiveUnit(nodes, energy, unit.pressed, area))
+        if not f[i] >= level * (1.0 - _TIE):
+            level, place = f[i], {}
+        if unit.pressed in place:
+            first = out[place[unit.pressed]]
+            nodes = np.union1d(first.nodes, unit.nodes)
+            energy, area = first.energy + unit.energy, first.area + unit.area
+            out[place[unit.pressed]] = CohesiveUnit(nodes, energy, unit.pressed, area)
         else:
-            level = f[i]
+            place[unit.pressed] = len(out)
             out.append(unit)
     return out
 

@@ -199,7 +199,7 @@ class NewtonEquilibria:
     def _go(self, corner: Corner, divisions: int) -> None:
         """From the equilibrium found last to another one, in as many pieces as it needs."""
         solver = self._solver
-        here = Corner(solver.at, solver.state.loads)
+        here = Corner(solver.accepted.at, solver.state.loads)
         force = self._analysis.given_force(self._analysis.time)
         try:
             solver.move(corner.loads, force, corner.time, corner.time - here.time)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from fxcrack.base import log
+from fxcrack.base.checks import counted
 from fxcrack.base.errors import (
     ComesApart,
     ConvergenceError,
@@ -191,7 +192,7 @@ def why_ended(analysis: Analysis, ends: Sequence[Until], end_time: float) -> str
             return f"time {end.time:g} reached"
         if isinstance(end, Releases):
             if sum(g.n_released for g in analysis.active) >= end.count:
-                return f"{end.count} nodes released"
+                return f"{counted(end.count, 'node')} released"
         if isinstance(end, CrackLength):
             g = _crack_of(analysis, end)
             tips = analysis.tip_values[analysis.active.index(g)].tips

@@ -10,7 +10,7 @@ from fxcrack.history import Row
 from fxcrack.solvers.explicit import ExplicitSolver
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
-from fxcrack.steps.rows import load_columns
+from fxcrack.steps.rows import critical_columns, load_columns
 
 NODES_OF_SPEED = 5
 """Releases over which the speed of a tip is taken."""
@@ -80,12 +80,7 @@ def explicit_row(
         row[f"speed[{g.title}]"] = speed.at(analysis.time)
         row[f"released[{g.title}]"] = g.n_released
         row[f"spent[{g.title}]"] = spent_per_area(solver, g)
-        if len(v.tips):
-            i = v.largest
-            row[f"f[{g.title}]"] = float(v.f[i])
-            for name, quantity in v.report.items():
-                row[f"{name}[{g.title}]"] = float(quantity[i])
-            row[f"node[{g.title}]"] = int(v.tips.node[i])
+        row |= critical_columns(g, v)
     stored, spent = solver.stored_now(), solver.spent()
     work = solver.external_work()
     scaled = stored.pop("mass_scaling_energy", None)

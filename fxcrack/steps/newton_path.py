@@ -153,6 +153,10 @@ class NewtonLoadPath:
                     self._report_jump(before, level, bracket)
                 return True
             undecided += jumps
+            if undecided and self._by_yielding:
+                self._until_yielding(target, upward=upward)
+                self._report_jump(level, self._analysis.largest, bracket)
+                return True
             if undecided > 1:
                 self._report_jump(before, level, bracket)
                 return True
@@ -184,6 +188,31 @@ class NewtonLoadPath:
             before, level, self._analysis.time, trials,
         )  # fmt: skip
         self._record("snap")
+
+    @property
+    def _by_yielding(self) -> bool:
+        """Whether f is that of a tangent which is another one where the bodies yield."""
+        return self._solver.exact and self._solver.bodies.path_dependent
+
+    def _until_yielding(self, target: float, *, upward: bool) -> None:
+        """Go on, a little at first, until bodies whose yielding takes f over 1 do yield.
+
+        They begin to at the present load, but increments of next to no length do not show it: f
+        would be found on both sides of 1 at this load again and again.
+        """
+        step = _RESOLVED
+        while (self._analysis.largest < 1.0) == upward and step < _NO_PROGRESS:
+            begin = self._analysis.time
+            way = min(step * abs(begin), abs(target - begin))
+            guess = begin + (way if upward else -way)
+            try:
+                point, values = self._try(guess)
+            except NO_EQUILIBRIUM:
+                return
+            self._analysis.tip_values = values
+            self._analysis.advance(point, guess)
+            self._solver.commit()
+            step *= 2.0
 
     @property
     def _reversible(self) -> bool:

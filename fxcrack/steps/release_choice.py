@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from fxcrack.base.errors import InputError
 from fxcrack.criteria import ProgressiveRelease, ReleaseLaw, StepRelease
-from fxcrack.interface.pair import Pair
+from fxcrack.interface.pair import Pair, with_friction
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.debond import Debond
 from fxcrack.steps.explicit import Explicit
@@ -64,9 +64,9 @@ def explicit_law(debond: Debond) -> ReleaseLaw:
 
 def _why_at_once(debond: Debond, step: Step, pairs: Sequence[Pair]) -> str:
     """What excludes progressive release, in words; empty if nothing does."""
-    rough = [pair.title for pair in pairs if pair.friction is not None]
+    rough = with_friction(pairs)
     if rough:
-        return f"friction (interface '{rough[0]}')"
+        return f"friction (interface '{rough[0].title}')"
     if any(c.needs_free_faces for c in (debond.criterion, *debond.watch)):
         return "method='domain'"
     if debond.criterion.needs_exact_S:
@@ -93,14 +93,14 @@ def check_friction(debonds: Sequence[Debond], pairs: Sequence[Pair]) -> None:
     Raises:
         InputError: A debond names such a release law, or has such a criterion.
     """
-    rough = [pair.title for pair in pairs if pair.friction is not None]
+    rough = with_friction(pairs)
     for debond in debonds:
         named = debond.release is not None and debond.release.driver == "opening"
         if rough and (named or debond.criterion.softens):
             raise InputError(
                 f"interface '{debond.interface.title}' is released progressively with its opening, "
-                f"which is not possible beside friction (interface '{rough[0]}') but in explicit "
-                "dynamics; use StepRelease(), RampRelease(increments=...) or "
+                f"which is not possible beside friction (interface '{rough[0].title}') but in "
+                "explicit dynamics; use StepRelease(), RampRelease(increments=...) or "
                 "AmplitudeRelease(...), leave friction out, or take an Explicit step"
             )
 

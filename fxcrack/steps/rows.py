@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from fxcrack.criteria.evaluator import TipValues
 from fxcrack.history import Row
 from fxcrack.solvers.base import AnySolver
 from fxcrack.steps.analysis import Analysis
+from fxcrack.steps.crack import Crack
 from fxcrack.steps.shared_numbers import columns_of_shared, is_shared
 
 Observer = Callable[[str, Row], None]
@@ -56,6 +58,22 @@ def load_columns(solver: AnySolver) -> list[tuple[str, str, bool]]:
     return names + [(f"F[{x.title}]", f"v[{x.title}]", True) for x in solver.loads]
 
 
+def critical_columns(crack: Crack, values: TipValues) -> Row:
+    """Columns of the tip whose f is largest: f, what is behind it, and its node; none without tips.
+
+    Args:
+        crack: The crack.
+        values: Values of its criteria at the present tips.
+    """
+    if not len(values.tips):
+        return {}
+    i, title = values.largest, crack.title
+    row: Row = {f"f[{title}]": float(values.f[i])}
+    row |= {f"{name}[{title}]": float(part[i]) for name, part in values.report.items()}
+    row[f"node[{title}]"] = int(values.tips.node[i])
+    return row
+
+
 def history_row(analysis: Analysis, event: str) -> Row:
     """Loads, reactions, cracks, criteria and energies of the present state; collective.
 
@@ -93,12 +111,7 @@ def history_row(analysis: Analysis, event: str) -> Row:
         row[f"a[{g.title}]"] = g.extent.length(v.tips)
         row[f"area[{g.title}]"] = g.extent.area(v.tips)
         row[f"released[{g.title}]"] = g.n_released
-        if len(v.tips):
-            i = v.largest
-            row[f"f[{g.title}]"] = float(v.f[i])
-            for name, quantity in v.report.items():
-                row[f"{name}[{g.title}]"] = float(quantity[i])
-            row[f"node[{g.title}]"] = int(v.tips.node[i])
+        row |= critical_columns(g, v)
     row |= stored
     row["external_work"] = work
     row["released_energy"] = balance.released - balance.viscous
