@@ -81,7 +81,7 @@ def test_rows_of_a_history_by_slices_and_files_of_other_kinds(tmp_path: Path) ->
     scene = specimen(mesh(MPI.COMM_SELF))
     history = grow_to(scene, 32.0)
     assert history[-2:] == [history[-2], history[-1]]
-    with pytest.raises(fx.InputError, match=r"history\[...\]: a column"):
+    with pytest.raises(fx.InputError, match="history: column"):
         history[None]
     with pytest.raises(fx.InputError, match=r"a report is an .html file, not 'run.pdf'"):
         scene.report("run.pdf")
