@@ -194,6 +194,21 @@ def test_alike_interfaces_let_go_together():
     scene.close()
 
 
+@pytest.mark.parametrize(
+    ("other", "says"),
+    [
+        ({"partial": False}, "others have not"),
+        ({"method": "closure"}, r"Fatigue\(method='closure'\) cannot grow in part beside"),
+    ],
+)
+def test_interfaces_that_cannot_grow_in_part_together_are_refused(other, says):
+    criteria = fatigue_law(partial=True), fatigue_law(**other)
+    scene, _ = stacked(MPI.COMM_SELF, [(30.0, criterion) for criterion in criteria])
+    with pytest.raises(fx.InputError, match=says):
+        scene.run(fx.Cycles(maximum=HALF_OPENING, ratio=0.1, n_max=10.0))
+    scene.close()
+
+
 @pytest.mark.mpi
 def test_static_growth_cycles_and_static_growth_in_turn(comm):
     scene, (one, _) = stacked(comm, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue_law())])
