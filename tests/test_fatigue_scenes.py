@@ -237,8 +237,9 @@ def test_static_growth_cycles_and_static_growth_in_turn(comm):
 def test_cycles_beside_bonds_that_soften():
     # a progressive front half-way through its elements stays as it is while another one is cycled
     scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue_law())])
-    scene.debonds[0] = fx.Debond(one, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())
-    brittle, tired = scene.debonds
+    brittle = fx.Debond(one, fx.VCCT(GIc=0.2), release=fx.ProgressiveRelease())
+    tired = scene.debonds[1]
+    scene = scene.rebuilt(debonds=[brittle, tired])
     scene.run(fx.Static(until=fx.CrackLength(one, 32.0)), grow=[brittle])
     before = scene.history.rows[-1]
     assert scene.solver.system.soft.bonds
