@@ -135,12 +135,14 @@ def _warn_of_jumps(analysis: Analysis) -> None:
 def grows_in_part(analysis: Analysis) -> bool:
     """Whether fronts advance through their elements in part.
 
-    Where no interface says so, they do in 3-D, if that is possible.
+    Where no interface says so, they do in 3-D, if that is possible, and where a front has begun to
+    in an earlier step.
     """
     ways = {cyclic_parts(g)[0].partial for g in analysis.active}
     if True in ways or False in ways:
         return True in ways
-    return not _why_by_node(analysis)
+    begun = any((analysis.fatigue.ligaments[g.p].part > 0.0).any() for g in analysis.active)
+    return begun or not _why_by_node(analysis)
 
 
 def _why_by_node(analysis: Analysis) -> str:
