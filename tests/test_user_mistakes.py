@@ -123,3 +123,5 @@ def test_too_few_increments_are_told(caplog: pytest.LogCaptureFixture) -> None:
     )
     moved.run(fx.Explicit(until=fx.Time(1e-4)))
     assert "is over after 1 of them" in caplog.text and "tonnes per mm^3" in caplog.text
+    moved.run(fx.Explicit(until=fx.Time(2e-4)))  # further steps may be short
+    assert caplog.text.count("is over after") == 1
