@@ -144,7 +144,7 @@ class History:
             return self.rows[column]
         if isinstance(column, int | np.integer):
             return self.rows[int(column)]
-        text("history[...]", "a column", column)
+        text("history", "column", column)
         if self.rows and column not in self.columns:
             unknown_name("column", column, self.columns)
         return np.array([row.get(column, np.nan) for row in self.rows])

@@ -175,12 +175,13 @@ def test_growth_under_injected_volume(comm: MPI.Intracomm) -> None:
 
     A soft body is blown up (openings of a tenth of the radius), which stiffens it.
     """
-    step = fx.Static(until=fx.Releases(1), **VOLUME)
-    small, stiff = (
-        onsets(inflated(comm, 1e5, finite=f).run(step, progress=False)) for f in (False, True)
-    )
-    for name in ("F[fluid]", "v[fluid]"):  # strains of 1e-3 change stiffnesses by as much
-        assert column(stiff, name) == pytest.approx(column(small, name), rel=1e-3)
+    if comm.size == 1:
+        step = fx.Static(until=fx.Releases(1), **VOLUME)
+        small, stiff = (
+            onsets(inflated(comm, 1e5, finite=f).run(step, progress=False)) for f in (False, True)
+        )
+        for name in ("F[fluid]", "v[fluid]"):  # strains of 1e-3 change stiffnesses by as much
+            assert column(stiff, name) == pytest.approx(column(small, name), rel=1e-3)
     runs = [
         inflated(comm, 10.0).run(fx.Static(until=fx.Releases(2), **s), progress=False)
         for s in (VOLUME, {"stepping": "path"})

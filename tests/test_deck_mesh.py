@@ -57,8 +57,10 @@ def test_replaced_and_refused_element_types():
 
 
 def test_refused_elements_name_file_line_and_remedy(tmp_path):
+    # what is made of them, and named by sets, is no fault beside
+    made = "*ELGEN, ELSET=MORE\n1, 2, 1, 1\n*ELSET, ELSET=BOTH\nMORE\n"
     with pytest.raises(DeckError) as caught:
-        read(tmp_path, PLATE.replace("CPE4", "COH2D4") + STEP)
+        read(tmp_path, PLATE.replace("CPE4", "COH2D4") + made + STEP)
     assert "model.inp, line 10: element type COH2D4 is refused: cohesive" in str(caught.value)
     assert "use *DEBOND" in str(caught.value)
 

@@ -120,10 +120,11 @@ def test_a_default_that_a_deck_does_not_have_is_said(tmp_path, caplog):
         assert caplog.text.count("released progressively by default") == said
         assert fx.read_deck(tmp_path / "a.inp").scene.debonds[0].release == fx.StepRelease()
     turn = fx.Amplitude((0.0, 0.5, 1.0), (0.1, 1.0, 0.1))
-    for partial, said in ((False, 0), (None, 1)):
+    second_order = dcb_3d(length=60.0, dx=20.0, dy=20.0, ny=1, order=2)
+    for grid, partial, said in ((mesh, False, 0), (second_order, None, 0), (mesh, None, 1)):
         paris = fx.Paris(10.0, -1.0, 1e-3, 2.0, 0.01, 0.95)
         one = scene(
-            mesh, fx.Fatigue(GIc=0.5, paris=paris, partial=partial), model=fx.Solid(),
+            grid, fx.Fatigue(GIc=0.5, paris=paris, partial=partial), model=fx.Solid(),
             loads=[fx.PointForce("pin_top", (0.0, 20.0, 0.0), turn)],
             supports=[fx.Displacement("far_upper", x=0.0, y=0.0, z=0.0),
                       fx.Displacement("far_lower", x=0.0, y=0.0, z=0.0)],

@@ -132,6 +132,9 @@ def test_increments_are_those_of_the_stable_one() -> None:
     steps.adapt(3, 0.09, 1.0)
     # 10 % less, and 10 % less again ahead
     assert steps.dt <= 0.081
+    assert steps.shortened == pytest.approx(0.1 / 0.081, rel=0.02)
+    # a step that ends before its first increment would
+    assert Increments(1.0, 1.001, 0.1, 0.1).shortened == 1.0
     at, n = steps.time(3), 3
     assert at == pytest.approx(1.3)
     kept = Increments(1.0, 2.0, 0.1, 0.1)

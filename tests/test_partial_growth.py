@@ -28,6 +28,7 @@ from specimens import (
 
 import fxcrack as fx
 from fxcrack.meshes.dcb import dcb_2d, dcb_3d
+from fxcrack.steps import partial_growth
 
 STEEP = fx.Paris(c1=50.0, c2=-2.0, c3=0.5, c4=10.6, r1=0.2, r2=0.95)
 
@@ -114,7 +115,9 @@ def front_of(scene: fx.Scene, dx: float = 1.0) -> tuple[fx.FrontLine, np.ndarray
     return line, line.x[:, 0] + scene.fatigue.ligaments[0].part[line.node] * dx
 
 
-def test_a_front_in_3d_whose_nodes_jump_is_warned_of(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_front_in_3d_whose_nodes_jump_is_warned_of(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Once; not where the front grows in part, the default, nor where it is one element wide."""
     for dy, partial in ((2.5, None), (10.0, False), (2.5, False)):
         assert "jump one after" not in caplog.text
@@ -123,6 +126,10 @@ def test_a_front_in_3d_whose_nodes_jump_is_warned_of(caplog: pytest.LogCaptureFi
             step = fx.Cycles(maximum=0.3, ratio=0.1, until=fx.Releases(n))
             history = scene.run(step, progress=False)
         assert bool((scene.fatigue.ligaments[0].part > 0.0).any()) == (partial is None)
+        with monkeypatch.context() as patch:
+            # whatever grows beside it in a further step, what has begun so goes on so
+            patch.setattr(partial_growth, "why_by_node", lambda *_, **__: "friction")
+            assert partial_growth.grows_in_part(scene.analysis) == (partial is None)
         if partial is None:  # rows at the beginning and the end of a step have the same front
             step = fx.Cycles(maximum=0.3, ratio=0.1, n_max=float(history["N"][-1]))
             n, reached = len(history), history["a[bond]"][-1]

@@ -81,7 +81,7 @@ def test_rows_of_a_history_by_slices_and_files_of_other_kinds(tmp_path: Path) ->
     scene = specimen(mesh(MPI.COMM_SELF))
     history = grow_to(scene, 32.0)
     assert history[-2:] == [history[-2], history[-1]]
-    with pytest.raises(fx.InputError, match=r"history\[...\]: a column"):
+    with pytest.raises(fx.InputError, match="history: column"):
         history[None]
     with pytest.raises(fx.InputError, match=r"a report is an .html file, not 'run.pdf'"):
         scene.report("run.pdf")
@@ -123,3 +123,5 @@ def test_too_few_increments_are_told(caplog: pytest.LogCaptureFixture) -> None:
     )
     moved.run(fx.Explicit(until=fx.Time(1e-4)))
     assert "is over after 1 of them" in caplog.text and "tonnes per mm^3" in caplog.text
+    moved.run(fx.Explicit(until=fx.Time(2e-4)))  # further steps may be short
+    assert caplog.text.count("is over after") == 1

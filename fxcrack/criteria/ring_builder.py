@@ -416,9 +416,10 @@ class RingBuilder:
 
     def _held(self, front: Front) -> Ints:
         """Global displacement nodes of both sides that are bonded, shape (n,)."""
-        masters = [self._probe.pair.masters[k] for k in np.flatnonzero(front.bonded)]
-        slaves = front.surface.dofs[front.bonded]
-        return np.concatenate([slaves, *masters]) if len(self._masters) else slaves
+        pair, bonded = self._probe.pair, front.bonded
+        # nodes without a weight may be those of an open facet beside the front
+        masters = pair.masters[bonded][np.abs(pair.weights[bonded]) > 1e-9]
+        return np.concatenate([front.surface.dofs[bonded], masters])
 
     def _own_facets(self, cells: FrontCells) -> Bools:
         """Whether each facet of a cell is one of the interface, shape (n_cells, n_facets)."""

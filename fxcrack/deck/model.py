@@ -5,6 +5,8 @@ Parts, instances and sets; the cards of each material, interaction and step in t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -105,19 +107,25 @@ class _Walk:
 
     def run(self, cards: list[Card]) -> Model:
         for card in cards:
-            try:
+            with self._if_not_refused():
                 self._take(card)
-            except DeckError:
-                # what was made of refused elements is missing: that is no further fault
-                if not self._report.refused:
-                    raise
         if self._step is not None:
             self._step.card.fail("the step has no *END STEP; the deck may be cut off")
-        self._resolve_early()
+        with self._if_not_refused():
+            self._resolve_early()
         if self._space is not self._model.root:
             cards[-1].fail(f"the part or instance '{self._space.name}' never ends")
         sort_out_markers([self._model.root, *self._model.instances.values()], self._report)
         return self._model
+
+    @contextmanager
+    def _if_not_refused(self) -> Iterator[None]:
+        """Pass on faults unless elements are refused: what was made of those is missing."""
+        try:
+            yield
+        except DeckError:
+            if not self._report.refused:
+                raise
 
     def _resolve_early(self) -> None:
         """Make the sets of the present space that name sets defined after them.

@@ -23,6 +23,7 @@ from fxcrack.continuum.kinematics import PlaneStress
 from fxcrack.continuum.loads import Monitor
 from fxcrack.continuum.section import Section
 from fxcrack.continuum.temperature import Temperature
+from fxcrack.criteria import Fatigue
 from fxcrack.deck.gather import Gathered, gather
 from fxcrack.deck.lines import number
 from fxcrack.deck.procedures import DeckStep
@@ -37,6 +38,7 @@ from fxcrack.effects import FiniteStrain
 from fxcrack.scene import Scene
 from fxcrack.steps.cycles import Cycles
 from fxcrack.steps.explicit import Explicit
+from fxcrack.steps.partial_growth import why_by_node
 from fxcrack.steps.static import Static
 
 
@@ -194,11 +196,22 @@ class _Writer:
                 refuse(f"step '{step.name}', in which '{debond.interface.title}' may not grow")
             if grows and not explicit:
                 nodal = self.toughness[i] is not None
-                out += debond_lines(debond, step.step, self.scene.pairs, nodal=nodal)
+                out += debond_lines(
+                    debond, step.step, self.scene.pairs, nodal=nodal,
+                    in_part=self._grows_in_part(step),
+                )  # fmt: skip
         monitors = [line for m in self.scene.input.monitors for line in self._monitor(m)]
         if monitors:
             out += ["*OUTPUT, HISTORY", *monitors]
         return [*out, "*END STEP"]
+
+    def _grows_in_part(self, step: DeckStep) -> bool:
+        """Whether fronts of fatigue grow in part in a step where nothing else is named."""
+        scene = self.scene
+        grow = [d.criterion for d in scene.debonds if d.interface.title in step.grow]
+        criteria = [c for c in grow if isinstance(c, Fatigue)]
+        linear = scene.analysis.linear
+        return not why_by_node(scene.continuum, scene.pairs, criteria, linear=linear)
 
     def _monitor(self, monitor: Monitor) -> list[str]:
         axes = np.flatnonzero(monitor.direction)

@@ -24,7 +24,9 @@ from fxcrack.steps.debond import Debond
 from fxcrack.steps.release_choice import Step, choose_release
 
 
-def debond_lines(debond: Debond, step: Step, pairs: Sequence[Pair], *, nodal: bool) -> list[str]:
+def debond_lines(
+    debond: Debond, step: Step, pairs: Sequence[Pair], *, nodal: bool, in_part: bool
+) -> list[str]:
     """Lines of a debond in a step that is not explicit.
 
     Args:
@@ -32,6 +34,7 @@ def debond_lines(debond: Debond, step: Step, pairs: Sequence[Pair], *, nodal: bo
         step: The step.
         pairs: All paired interfaces of the scene.
         nodal: Whether the toughness is given at the slave nodes.
+        in_part: Whether fronts of fatigue grow in part where nothing else is named.
 
     Raises:
         InputError: A deck has no word for it.
@@ -52,8 +55,7 @@ def debond_lines(debond: Debond, step: Step, pairs: Sequence[Pair], *, nodal: bo
         )
         release = StepRelease()
     criterion = debond.criterion
-    in_3d = any(pair.surface.dim == 2 for pair in pairs)
-    if in_3d and isinstance(criterion, Fatigue) and criterion.partial is None:
+    if in_part and isinstance(criterion, Fatigue) and criterion.partial is None:
         log.warn(
             "write_deck: interface '%s' grows in part by default (solids of first order in 3-D), "
             "which a deck does not have: read again its nodes go one after the other, and cycles "

@@ -81,6 +81,9 @@ from fxcrack.interface.shared_unknowns import SharedUnknowns
 from fxcrack.interface.supported_slaves import align_frames, check_slaves
 from fxcrack.interface.supports import Supports
 
+_NONE = np.zeros(1)
+"""Value of a component that has no number."""
+
 FIXED, FREE, RETAINED = 0, 1, 2
 """Roles of a jump component: always zero, free in the continuum, or retained."""
 
@@ -144,7 +147,7 @@ def global_vectors(index: Ints, frames: Array, values: Array) -> Array:
     Returns:
         Shape (..., 3); zero where a component has no number.
     """
-    local = np.append(values, 0.0)[index]  # the last one where the index is -1
+    local = np.concatenate((values, _NONE))[index]  # the last one where the index is -1
     out = np.zeros((*index.shape[:-1], 3))
     out[..., : index.shape[-1]] = np.einsum("...ck,...k->...c", frames, local)
     return out

@@ -39,7 +39,7 @@ class EnergyAccounts:
         self._dynamics, self._loads, self._sums = dynamics, loads, sums
         self._damped = damped
         self._contact = any(pair.interface.contact for pair in pairs)
-        self._friction = any(pair.friction is not None for pair in pairs)
+        self._friction = any(pair.interface.friction is not None for pair in pairs)
         self._elastic = bool(dynamics.elastic.local.any())
 
     def stored(self, velocity: Array, dt: float, factors: Array) -> dict[str, float]:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from fxcrack.base.arrays import Array, Bools, Ints
-from fxcrack.equilibrium.contact import Equilibrium
+from fxcrack.equilibrium.contact import ContactSystem, Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
 from fxcrack.interface.crack_pressure import CrackPressure
 from fxcrack.interface.front import Front
@@ -41,6 +41,7 @@ class CondensedFrontProbe:
         self.front: Front = solver.fronts[p]
         self.gdim: int = solver.continuum.gdim
         self.bodies = CondensedBodies(solver)
+        self._roots: tuple[Array, float | Array, Array] | None = None  # of S and its round-off
 
     @property
     def pair(self) -> Pair:
@@ -86,15 +87,29 @@ class CondensedFrontProbe:
         """How large bond forces may be by round-off alone, shape (...) [force]."""
         system = self._solver.system
         index = self._solver.index[self._p][nodes]
+        n = len(state.jump)
+        roots = self._roots_of_round_off(system)
+        size = roots[:n] @ np.abs(state.jump)
+        size += roots[n : n + len(state.loads)] @ np.abs(state.loads)
+        if (roots.any() and size > 0.0) or not system.n_retained:
+            return np.asarray((size * roots[index]).max(axis=-1))
+        each = np.zeros(len(roots))
+        rows = np.unique(index[index >= 0])
         x = np.abs(np.concatenate([state.jump, state.loads]))
-        # an entry S_ij is off by what those on the diagonal of the bodies' matrix allow
-        most = _MOST_ROUND_OFF * np.abs(np.diagonal(system.schur))
-        error = np.minimum(system.cholesky.round_off, most)
-        each = np.append(np.sqrt(error) * (np.sqrt(error[: len(x)]) @ x), 0.0)
-        if not each.any() and system.n_retained:
-            rows = np.unique(index[index >= 0])
-            each[rows] = _OF_PRODUCTS * (np.abs(system.schur[rows, : len(x)]) @ x)
-        return np.asarray(each[np.where(index >= 0, index, -1)].max(axis=-1))
+        each[rows] = _OF_PRODUCTS * (np.abs(system.schur[rows, : len(x)]) @ x)
+        return np.asarray(each[index].max(axis=-1))
+
+    def _roots_of_round_off(self, system: ContactSystem) -> Array:
+        """Square roots of the round-off of entries of S, and a zero for what has no number.
+
+        An entry S_ij is off by what those on the diagonal of the bodies' matrix allow. They stay
+        while S does, so that they are kept for it.
+        """
+        schur, given = system.schur, system.cholesky.round_off
+        if self._roots is None or self._roots[0] is not schur or self._roots[1] is not given:
+            most = _MOST_ROUND_OFF * np.abs(np.diagonal(schur))
+            self._roots = schur, given, np.append(np.sqrt(np.minimum(given, most)), 0.0)
+        return self._roots[2]
 
     def jumps(self, nodes: Ints, state: Equilibrium) -> Array:
         """Jumps, global vectors of shape (..., 3) [length]."""

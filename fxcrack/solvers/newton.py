@@ -421,7 +421,7 @@ class NewtonSolver(InterfaceSolver):
 
         Returns:
             What :meth:`InterfaceSolver.collect` gives; on rank 0 bodies.* of
-            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (5,); and the
+            :meth:`WeakForm.state`; pairing.*[p] where faces slide far; sums, shape (6,); and the
             tangent, see :func:`~fxcrack.solvers.newton_state.tangent_arrays`.
         """
         out = super().collect() | self.accepted.arrays(self.interfaces)

@@ -103,7 +103,8 @@ class ExplicitDriver:
         if self._resume is not None and "increments" in self._resume:
             increments.restore(self._resume["increments"])
         solver.dt = increments.dt
-        if length < _FEW * solver.dt:
+        # a further step of bodies that move, or a chosen increment, may be as short as it likes
+        if length < _FEW * solver.dt and self.step.dt is None and not solver.increments:
             log.warn(
                 "Explicit: increments are %g long and the step is over after %d of them, too few "
                 "for anything to move; are end time and density of the same units as moduli and "

@@ -71,8 +71,8 @@ class Increments:
 
     @property
     def shortened(self) -> float:
-        """The longest increment over the present one."""
-        return self._longest / self.piece.dt
+        """The longest increment over the present one; what the end of the step cuts off is none."""
+        return float(_GRADE**-self._grade)
 
     def time(self, n: int) -> float:
         """Time at which increment n begins; n from the present piece on."""

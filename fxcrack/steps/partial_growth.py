@@ -8,7 +8,7 @@ element is passed; its ligament (:mod:`fxcrack.criteria.ligaments`) carries noth
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -18,13 +18,15 @@ import numpy.typing as npt
 from fxcrack.base import log
 from fxcrack.base.arrays import Array, Bools, Ints
 from fxcrack.base.errors import ComesApart, InputError
+from fxcrack.continuum.continuum import Continuum
 from fxcrack.continuum.continuum_shell import ContinuumShell
 from fxcrack.continuum.shell_bodies import ShellBodies
-from fxcrack.criteria import Regime
+from fxcrack.criteria import Fatigue, Regime
 from fxcrack.criteria.evaluator import TipValues
 from fxcrack.equilibrium.cohesive_law import CohesiveBond
 from fxcrack.equilibrium.contact import Equilibrium
 from fxcrack.equilibrium.growing_cholesky import NotPositiveDefinite
+from fxcrack.interface.pair import Pair, with_friction
 from fxcrack.steps.analysis import Analysis
 from fxcrack.steps.crack import Crack
 from fxcrack.steps.cycle_state import TipCycle
@@ -82,11 +84,11 @@ def attach_ligaments(analysis: Analysis) -> None:
         )
     for g in analysis.active:
         method = cyclic_parts(g)[0].method
-        if method != "vcct":  # another interface has partial=True, and this one no word on it
+        if method != "vcct":
             raise InputError(
-                f"interface '{g.title}': Fatigue(method='{method}') cannot grow in part, but "
-                "another interface has Fatigue(partial=True); give both method='vcct' or "
-                "partial=False, or let them grow in steps of their own, grow=[...]"
+                f"interface '{g.title}': Fatigue(method='{method}') cannot grow in part beside "
+                "interfaces with partial=True; take method='vcct', or let them grow in steps of "
+                "their own, grow=[...]"
             )
         if analysis.continuum.order > 1:
             raise InputError(
@@ -97,10 +99,12 @@ def attach_ligaments(analysis: Analysis) -> None:
         tips = g.tips()
         if g.front.surface.dim == 2 and len(tips):
             slender = float(np.median(advance(tips) / tips.width))
-            if slender > _SLENDER:
+            key = f"long elements of {g.title}"
+            if slender > _SLENDER and key not in analysis.said:
+                analysis.said.add(key)
                 log.warn(
                     "interface '%s': elements at the front are %.3g times as long in the growth "
-                    "direction as they are wide; growing in part (Fatigue(partial=True), the "
+                    "direction as they are wide; with growth in part (partial=True, the "
                     "default in 3-D) lives then depend on the mesh by more than 10 %%: make them "
                     "at most as long as wide",
                     g.title,
@@ -131,30 +135,45 @@ def _warn_of_jumps(analysis: Analysis) -> None:
 def grows_in_part(analysis: Analysis) -> bool:
     """Whether fronts advance through their elements in part.
 
-    Where no interface says so, they do in 3-D, if that is possible.
+    Where no interface says so, they do in 3-D, if that is possible, and where a front has begun to
+    in an earlier step.
     """
     ways = {cyclic_parts(g)[0].partial for g in analysis.active}
     if True in ways or False in ways:
         return True in ways
-    return not _why_by_node(analysis)
+    begun = any((analysis.fatigue.ligaments[g.p].part > 0.0).any() for g in analysis.active)
+    return begun or not _why_by_node(analysis)
 
 
 def _why_by_node(analysis: Analysis) -> str:
-    """Why fronts do not grow in part by default, in words; empty where they do."""
-    if all(g.front.surface.dim < 2 for g in analysis.active):
+    """Why the fronts of an analysis do not grow in part by default, in words."""
+    criteria = [cyclic_parts(g)[0] for g in analysis.active]
+    return why_by_node(analysis.continuum, analysis.pairs, criteria, linear=analysis.linear)
+
+
+def why_by_node(
+    continuum: Continuum, pairs: Sequence[Pair], criteria: Sequence[Fatigue], *, linear: bool
+) -> str:
+    """Why fronts do not grow in part by default, in words; empty where they do.
+
+    Args:
+        continuum: The bodies.
+        pairs: All interfaces.
+        criteria: Criteria of the interfaces that grow together.
+        linear: Whether the bodies are linear.
+    """
+    if all(pair.surface.dim < 2 for pair in pairs):
         return "a model in the plane"
-    if not analysis.linear:
+    if not linear:
         return "bodies are not linear"
-    continuum = analysis.continuum
     if isinstance(continuum, ShellBodies) or any(
         isinstance(m, ContinuumShell) for m in continuum.part_materials
     ):
         return "shells"
     if continuum.order > 1:
         return "elements of second order"
-    if analysis.condensed.system.friction is not None:
+    if with_friction(pairs):
         return "friction"
-    criteria = [cyclic_parts(g)[0] for g in analysis.active]
     others = [c.method for c in criteria if c.method != "vcct"]
     if others:
         return f"method='{others[0]}'"

@@ -125,7 +125,7 @@ def history_row(analysis: Analysis, event: str) -> Row:
         row["viscous_energy"] = balance.viscous
     if system.soft.bonds or system.soft.finished:
         row["snap_energy"] = analysis.snap_energy
-    if system.friction is not None:
+    if any(pair.interface.friction is not None for pair in solver.pairs):  # 0.0 as well
         row["friction_energy"] = solver.friction_energy
     row |= spent
     if balance.kinetic:

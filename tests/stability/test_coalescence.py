@@ -85,9 +85,7 @@ def test_body_that_comes_free(law: str) -> None:
             "upper_face", "lower_face", bonded=lambda x: x[0] >= 15.0 - 1e-9, name="bond"
         ),
         criterion=fx.VCCT(GIc=0.2, unstable_tolerance=np.inf),
-    )
-    scene.analysis.debonds[0] = fx.Debond(
-        scene.debonds[0].interface, scene.debonds[0].criterion, LAWS[law]
+        release=LAWS[law],
     )
     history = watched(scene, until=fx.Releases(99))
     assert history.reason.startswith("total separation: ")

@@ -50,9 +50,7 @@ def test_front_crosses_borders(
             a0=2.0,
             supports=CLAMPED_3D,
             criterion=fx.VCCT(GIc=0.2, method=method),
-        )
-        scene.analysis.debonds[0] = fx.Debond(
-            scene.debonds[0].interface, scene.debonds[0].criterion, release
+            release=release,
         )
         histories.append(scene.run(fx.Static(until=fx.Releases(60)), progress=False))
         if where is comm and comm.size > 1:
