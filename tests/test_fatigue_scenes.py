@@ -219,6 +219,16 @@ def test_static_growth_cycles_and_static_growth_in_turn(comm):
     scene.close()
 
 
+def test_one_way_to_grow_for_all_interfaces():
+    """Where one grows in part because it says so, an interface without a word must be able to."""
+    for other in ({"method": "closure"}, {"partial": False}):
+        criteria = [(30.0, fatigue_law(partial=True)), (30.0, fatigue_law(**other))]
+        scene, _ = stacked(MPI.COMM_SELF, criteria)
+        with pytest.raises(fx.InputError, match="steps of their own"):
+            scene.run(fx.Cycles(maximum=0.5, ratio=0.1, n_max=10.0), progress=False)
+        scene.close()
+
+
 def test_cycles_beside_bonds_that_soften():
     # a progressive front half-way through its elements stays as it is while another one is cycled
     scene, (one, _) = stacked(MPI.COMM_WORLD, [(30.0, fx.VCCT(GIc=0.2)), (30.0, fatigue_law())])
