@@ -124,6 +124,8 @@ class CellField:
         values, inside = np.zeros(len(points)), np.zeros(len(points), dtype=bool)
         low, high = self._boxes
         at = np.flatnonzero(((points >= low[cells]) & (points <= high[cells])).all(axis=1))
+        if not len(at):  # Basix 0.9 ends the process when it tabulates at no point
+            return values, inside
         simplex = self.cell in ("triangle", "tetrahedron")
         middle = basix.geometry(self._element.cell_type).mean(axis=0)
         reference = np.tile(middle, (len(at), 1))
