@@ -286,7 +286,7 @@ class TipEvaluator(Evaluator):
             f, report = found if isinstance(found, tuple) else (found, {})
             f = np.asarray(f, dtype=np.float64)
             report = {name: np.asarray(v, dtype=np.float64) for name, v in dict(report).items()}
-        except Exception as error:
+        except Exception as error:  # whatever the user's function may raise
             raise InputError(
                 f"{where}: the function of the criterion fails with {type(error).__name__}: "
                 f"{error}; it is called with the tips and arrays of shape ({n}, k, 3) of forces "
